@@ -74,7 +74,24 @@ FEATURES: Mapping[str, Make] = {
     "panels' membranes (`n5b8e`)": lambda s: s.case(s.sheet(preset="n5b8e", membrane="panel")),
     "shells": lambda s: s.case(s.shell()),
     "springs": lambda s: s.case(supports=[fd.Spring(1.0, nodes=[7])]),
+    "springs of changing length": lambda s: s.case(
+        supports=[fd.Spring(1.0, between=[(5, 7)], change=1e-4, history=fd.Ramp(DURATION))]
+    ),
+    "springs of changing stiffness": lambda s: s.case(
+        supports=[fd.Spring(1.0, nodes=[7], stiffness_history=fd.Ramp(1.0))]
+    ),
+    "bars": lambda s: s.case(supports=[fd.Bar([(5, 7)], 1.0)]),
+    "cables": lambda s: s.case(
+        supports=[fd.Cable([5, 7, (3, 1, 1)], 1.0, change=-0.01, history=fd.Ramp(DURATION))]
+    ),
     "end stops": lambda s: s.case(supports=[fd.Stop([0], 150.0, stiffness=1e-3, side="below")]),
+    "damped end stops": lambda s: s.case(
+        supports=[fd.Stop([0], 299.9, stiffness=1e-3, damping=1e-6)]
+    ),
+    "latches": lambda s: s.case(supports=[fd.Latch([0], 299.9, stiffness=1e-3)]),
+    "latches of `n5b8e`": lambda s: s.case(
+        s.sheet(scheme="n5b8e"), [fd.Latch([0], 299.9, stiffness=1e-3)]
+    ),
     "clamped edges": lambda s: s.case(s.sheet(clamped=[(0, 1)])),
     "clamped edges of `n5b8e`": lambda s: s.case(s.sheet(scheme="n5b8e", clamped=[(0, 1)])),
     "ties, rigid panels": lambda s: s.case(s.sheet(rigid=[3]), [fd.Link([5, 7], "z")]),
@@ -109,6 +126,7 @@ REASONS: Mapping[str, tuple[str, str]] = {
         "contacts stick or slide",
         "contacts stick or slide, so that no linear law describes small motions",
     ),
+    "c": ("stiffness_history", "only motions have a time in which a stiffness can vary"),
     "b": (
         "creep",
         "load factors that the method finds may turn back, so that no step has a time in which "

@@ -93,8 +93,18 @@ DATA: Calls = {
     "Spring": (fd.Spring, {
         "stiffness": 2.0, "between": [(0, 1)], "rest_length": 0.5,
     }),
+    "Bar": (fd.Bar, {
+        "between": [(0, 1)], "stiffness": 2.0, "rest_length": 0.5, "bending": 0.25,
+    }),
+    "Cable": (fd.Cable, {
+        "nodes": [0, 1, (0.5, 0.25, 1.0)], "stiffness": 2.0, "pretension": 0.5, "change": 0.25,
+    }),
     "Dashpot": (fd.Dashpot, {"coefficient": 2.0, "nodes": 0, "direction": (1.0, 0.0, 0.0)}),
-    "Stop": (fd.Stop, {"creases": [0], "angle": 30.0, "stiffness": 2.0, "side": "below"}),
+    "Stop": (fd.Stop, {"creases": [0], "angle": 30.0, "stiffness": 2.0, "side": "below",
+        "damping": 0.5}),
+    "Latch": (fd.Latch, {
+        "creases": [0], "angle": [30.0], "stiffness": 2.0, "release": 0.5, "until": 0.25,
+    }),
     "Link": (fd.Link, {"nodes": [0, 1], "to": [2, 3, 4]}),
     "Force": (fd.Force, {"nodes": [0, 1], "vector": (1.0, 0.0, 0.5), "history": fd.Step(0.5)}),
     "Gravity": (fd.Gravity, {"acceleration": (0.0, 0.0, -9.5)}),
@@ -343,6 +353,7 @@ def solved(folder: Path) -> Calls:
         "initial_state": (fd.initial_state, {"result": run, "at": 1}),
         "mac": (fd.mac, {"a": found, "b": found, "mass": [1.0, 2.0], "nodes": [4, 5]}),
         "case_of": (fd.case_of, {"ds": run}),
+        "latched": (fd.latched, {"result": run}),
         "save": (fd.save, {"ds": run, "path": folder / "again.nc"}),
         "load": (fd.load, {"path": folder / "run.nc", "whole": True}),
         "export": (fd.export, {"result": run, "path": folder / "run.csv", "format": None}),

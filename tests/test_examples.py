@@ -290,6 +290,19 @@ def sweep(found):
     assert np.std(scaled) / np.mean(scaled) < np.std(points) / np.mean(points)
 
 
+def winch_and_latch(found):
+    """Folded by the winch, held by latches, open again; its work is what is lost."""
+    motion, size, held = found["motion"], found["size"], found["held"]
+    assert motion.attrs["energy_error"] < 1e-3
+    assert size.min() < 0.7 * size[0]
+    assert size[215] < 0.9 * size[0]  # after 2.15 s the cable is slack, and latches hold
+    assert float(motion.tension[215, 0]) == 0.0
+    assert held[215] > 5
+    assert held[225:].max() == 0
+    assert size[-1] == pytest.approx(size[0], rel=1e-3)
+    assert float(motion.work[-1]) == pytest.approx(float(motion.dissipated[-1]), rel=2e-3)
+
+
 def thick_panel(found):
     """Hinges go where trigonometry says; closed, the stack is as high as its boards together."""
     assert found["error"] < 1e-8
@@ -302,12 +315,13 @@ CHECKS = (
     deployment, design_frequencies, design_kresling, design_miura, fidelity, hardening_miura,
     jumping_resonance, kresling_chain, kresling_chaos, miura_bands, miura_plate, point_mass,
     pressure, shaken_miura, snap_through, solar_panel, sweep, thick_panel,
+    winch_and_latch,
 )  # fmt: skip
 
 
 LONG = (
     air_deployment, contact_tower, design_miura, jumping_resonance, kresling_chaos, hardening_miura,
-    shaken_miura, solar_panel, sweep,
+    shaken_miura, solar_panel, sweep, winch_and_latch,
 )  # fmt: skip
 SHORT = [check for check in CHECKS if check not in LONG]
 

@@ -25,7 +25,9 @@ from foldyn.attractors import (
 from foldyn.cases import (
     Actuate as Actuate,
     Air as Air,
+    Bar as Bar,
     BaseMotion as BaseMotion,
+    Cable as Cable,
     Case as Case,
     Chirp as Chirp,
     Constant as Constant,
@@ -40,6 +42,7 @@ from foldyn.cases import (
     HalfSine as HalfSine,
     Harmonic as Harmonic,
     Impose as Impose,
+    Latch as Latch,
     LineLoad as LineLoad,
     Link as Link,
     ModalDamping as ModalDamping,
@@ -118,6 +121,7 @@ from foldyn.periodic import (
 from foldyn.results import (
     Quantity as Quantity,
     case_of as case_of,
+    latched as latched,
     load as load,
     save as save,
 )

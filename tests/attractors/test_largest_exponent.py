@@ -104,7 +104,7 @@ def test_what_has_no_exponent_is_refused(ueda):
     with pytest.raises(InputError, match="contact: the exponent needs smooth forces"):
         fd.lyapunov_exponent(touching, 1.0)
     yielding = fd.discretize(pattern, sheet, fold_law=fd.Plastic(10.0), preset="plate")
-    with pytest.raises(InputError, match="structure: some of its hinges yield or creep"):
+    with pytest.raises(InputError, match="some of its hinges yield, creep or have latches"):
         fd.lyapunov_exponent(fd.Case(yielding, [fd.Fix([4, 5])]), 1.0)
     with pytest.raises(InputError, match="duration = 1 s: is shorter than a period of the drive"):
         fd.lyapunov_exponent(ueda, 1.0)

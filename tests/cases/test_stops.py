@@ -5,6 +5,7 @@ import pytest
 
 import foldyn as fd
 from foldyn import checks
+from foldyn.dynamics import METHODS
 from foldyn.errors import InputError
 
 SHEET = fd.Sheet(2e9, 0.3, thickness=2e-3, density=900.0)
@@ -198,3 +199,36 @@ def test_panels_that_bend_keep_the_energy_of_a_stop(method, model):
     stored = sum(result[name] for name in ("kinetic", *case.energy_groups))
     assert float(result["strain_stops"].max()) >= 0.0
     assert np.abs(stored - result.work).max() < 1e-3 * np.abs(result.work).max()
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_damped_stop_takes_energy_of_an_impact(method):
+    """Half a damped swing on the stop: out with exp(-zeta pi / sqrt(1 - zeta^2)) of the speed."""
+    K, stiff, zeta = 1e-6, 40.0, 0.2
+    case, tip = flap("plate", [], mass="consistent", crease_stiffness=K)
+    x, pattern = case.structure.nodes, case.structure.pattern
+    a, b = sorted(set(pattern.faces[0]) & set(pattern.faces[1]))
+    axis = (x[b] - x[a]) / np.linalg.norm(x[b] - x[a])
+    away = np.linalg.norm(x[tip[0]] - x[a] - ((x[tip[0]] - x[a]) @ axis) * axis)
+    inertia = 900.0 * 2e-3 * LENGTH * away**3 / 3.0
+    rate = np.sqrt(stiff * LENGTH / inertia)
+    damping = 2.0 * zeta * rate * inertia / LENGTH
+    velocity = np.zeros_like(x)
+    moving = [*tip, int(case.structure.centers[1])]
+    velocity[moving] = np.cross(20.0 * axis, x[moving] - x[a])
+    ahead = x.copy()
+    ahead[moving] += 1e-6 * velocity[moving]
+    side = 1.0 if angle(case, ahead - x) > REST else -1.0
+    stop = fd.Stop("all", REST + 2.0 * side, stiffness=stiff, damping=damping)
+    case = case.altered(supports=[*case.supports, stop])
+    end = np.radians(4.0) / 20.0 + 1.6 * np.pi / rate
+    options = {"interval": end / 4, "initial": fd.State(velocity=velocity)}
+    options |= {"tolerance": 1e-8} if method == "dormand_prince" else {}
+    options |= {"dt": end / 4000} if METHODS[method].implicit else {}
+    motion = fd.simulate(case, end, method=method, **options)
+    kept = float(motion.kinetic[-1] / motion.kinetic[0])
+    left = np.exp(-2.0 * zeta * np.pi / np.sqrt(1.0 - zeta**2))
+    assert kept == pytest.approx(left, rel=0.02)
+    lost = (1.0 - kept) * float(motion.kinetic[0])
+    assert float(motion.dissipated[-1]) == pytest.approx(lost, rel=0.01)
+    assert motion.attrs["energy_error"] < 5e-3

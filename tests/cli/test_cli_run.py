@@ -144,6 +144,12 @@ def test_a_shipped_case_runs_by_its_name(workplace, name) -> None:
     assert (named.status, named.err) == (2, "foldyn: --out taken: is a file; name a folder\n")
 
 
+def test_modes_that_cannot_be_compared_are_no_failure(workplace) -> None:
+    """Some models of the paper's fold have modes that superelements lack."""
+    run = workplace.call("modes", "herkal/case1", "--no-figures")
+    assert run.status == 0, run.err
+
+
 @pytest.mark.matrix
 def test_the_module_runs_as_a_command(tmp_path, miura) -> None:
     (tmp_path / "case.toml").write_text(miura)

@@ -36,6 +36,14 @@ def test_a_row_for_each_sample_and_node(tmp_path):
         np.testing.assert_array_equal(found, run.velocity[:, :, k])
 
 
+def test_a_row_for_each_phase_and_band(tmp_path):
+    cell = fd.UnitCell(fd.Case(fd.discretize(fd.patterns.miura(), fd.Sheet(1e6, 0.3, 0.01, 1.0))))
+    bands = fd.bands(cell, phases=[(0.5, 0.0), (1.0, 0.0)], count=3, check_model=False)
+    frame = table(bands, tmp_path)
+    assert len(frame) == 6
+    np.testing.assert_array_equal(frame["frequency [Hz]"], bands.frequency.values.ravel())
+
+
 @pytest.mark.matrix
 def test_a_row_for_each_point_of_a_backbone_and_each_of_its_harmonics(tmp_path):
     spine = backbone()

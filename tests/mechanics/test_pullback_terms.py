@@ -91,6 +91,14 @@ TERMS: dict[str, Callable[[], Lone]] = {
     "springs without length": lambda: lone(
         supported(fd.Spring(35.0, between=[(1, 2)], rest_length=0.0)), SpringsTerm
     ),
+    "cables": lambda: lone(
+        supported(
+            fd.Cable([0, 2, 1, (0.2, 0.3, 1.0)], 400.0, pretension=90.0),
+            fd.Cable([1, 3], 400.0, rest_length=0.7),
+            fd.Bar([(0, 3)], 70.0, rest_length=2.0),
+        ),
+        SpringsTerm,
+    ),
     "clamps": lambda: lone(supported(clamped=[(0, 1)]), ClampsTerm),
     "dashpots": lambda: lone(damped("herkal", fd.CreaseDamping(0.3), AXIAL), ViscousTerm),
     "damped sides": lambda: lone(damped("shell", fd.CreaseDamping(0.3)), ViscousTerm),
@@ -129,8 +137,9 @@ ARRAYS = {  # that count, with a star where forces are linear, with a minus wher
     "membranes": OF_MEMBRANES,
     "membranes of hexagons": OF_MEMBRANES,
     "gives": OF_MEMBRANES,
-    "springs": "direction *stiffness vector length *stretch *axial_stiffness",
-    "springs without length": "*vector *axial_stiffness -length -stretch",
+    "springs": "direction *stiffness lines.vector lines.length *lines.stretch *lines.stiffness",
+    "springs without length": "*lines.vector *lines.stiffness -lines.length -lines.stretch",
+    "cables": "lines.vector lines.length *lines.stretch *lines.stiffness",
     "clamps": "bars.rest wings *bend_rest *stiffness",
     "dashpots": "axial corners *coefficient -hidden_turn",
     "damped sides": "corners hidden_turn *coefficient",

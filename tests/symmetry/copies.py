@@ -154,6 +154,9 @@ class Copy:
     def vertices(self, value: Any) -> Any:
         return self.node[np.array(value, np.int64)].tolist()
 
+    def line(self, value: Any) -> Any:
+        return [self.point(one) if np.ndim(one) else int(self.node[one]) for one in value]
+
     def edges(self, value: Any) -> Any:
         return self.symmetry.vertices[np.array(value, np.int64).reshape(-1, 2)].tolist()
 
@@ -259,6 +262,7 @@ LAWS = {law.__name__ for law in (*BAR_LAWS.values(), *HINGE_LAWS.values())}
 FIELDS: Mapping[str, Callable[[Copy, Any], Any]] = {
     **dict.fromkeys(("nodes", "between", "to"), Copy.vertices),
     **dict.fromkeys(("edges", "clamped", "straight"), Copy.edges),
+    "Cable.nodes": Copy.line,
     "guided": Copy.guided,
     **dict.fromkeys(("panels", "rigid"), Copy.panels_of),
     "creases": Copy.creases,
@@ -282,6 +286,8 @@ FIELDS: Mapping[str, Callable[[Copy, Any], Any]] = {
     **dict.fromkeys(("youngs_modulus", "poissons_ratio", "thickness", "density"), Copy.same),
     **dict.fromkeys(("length_scale_ratio", "fraction", "change", "expansion"), Copy.same),
     **dict.fromkeys(("stiffness", "rest_length", "coefficient", "alpha", "beta"), Copy.same),
+    **dict.fromkeys(("bending", "pretension", "stiffness_history", "release"), Copy.same),
+    **dict.fromkeys(("until", "Stop.damping"), Copy.same),
     **dict.fromkeys(("ratios", "times", "onset", "yield_moment", "isotropic"), Copy.same),
     **dict.fromkeys(("kinematic", "barrier_moment", "rate", "friction"), Copy.same),
     **dict.fromkeys(("added_mass", "drag", "drag_coefficient", "resolution"), Copy.same),
@@ -308,7 +314,8 @@ def copied(case: fd.Case, symmetry: Symmetry) -> tuple[fd.Case, Copy]:
 # ------------------------------------------------------------------ halves
 HALVED = {
     "vector", "total", "force_per_length", "acceleration", "pressure", "moment", "change",
-    "mass", "Spring.stiffness", "Stop.stiffness", "coefficient", "BaseMotion.value",
+    "mass", "Spring.stiffness", "Bar.stiffness", "Cable.stiffness", "Stop.stiffness",
+    "Latch.stiffness", "coefficient", "BaseMotion.value",
 }  # fmt: skip
 """Fields in proportion to which a part acts; a part that has none of them is not split."""
 
@@ -329,7 +336,10 @@ def halves(part: Any) -> list[Any]:
         value = getattr(part, item.name)
         if item.name in HALVED or f"{kind}.{item.name}" in HALVED:
             half = replace(part, **{item.name: (0.5 * np.array(value)).tolist()})
-            if getattr(part, "history", None) is None:
+            for other in ("pretension", "release", "damping"):
+                if getattr(part, other, None) is not None:
+                    half = replace(half, **{other: 0.5 * getattr(part, other)})
+            if getattr(part, "history", None) is None or isinstance(part, fd.Spring | fd.Cable):
                 return [half, half]
             return [half, replace(half, history=earlier(part.history))]
     return [part]

@@ -92,6 +92,13 @@ def _angles(s: Scene, given: dict) -> list[float]:
     ).tolist()
 
 
+def _line(s: Scene) -> list[Any]:
+    """Some vertices, one after the other, and perhaps a point on the ground."""
+    count = len(s.pattern.vertices)
+    line: list[Any] = s.rng.choice(count, min(count, 3), replace=False).tolist()
+    return [*line, s.vector(s.size)] if s.rng.random() < 0.5 else line
+
+
 def _layer(s: Scene) -> list[float]:
     return [s.positive(0.5 * s.structure.sheet.thickness), s.positive(1e6), s.positive(1e-8)]
 
@@ -128,11 +135,23 @@ FIELDS: Mapping[str, Callable[[Scene, dict], Any]] = {
     "layers": lambda s, _: [_layer(s), _layer(s)],
     "Stop.side": lambda s, _: str(s.rng.choice(["below", "above"])),
     "Stop.stiffness": lambda s, _: s.positive(s.moment),
+    "Stop.damping": lambda s, _: s.positive(0.1 * s.force * s.time),
+    "Latch.stiffness": lambda s, _: s.positive(s.moment),
+    "release": lambda s, _: s.positive(0.05 * s.moment),
+    "until": lambda s, _: s.time * s.rng.uniform(0.2, 2.0),
     "Impose.value": lambda s, given: s.each(0.5 * SMALL * s.size, given["nodes"]),
     "BaseMotion.value": lambda s, _: s.about(0.5 * SMALL * s.size),
     "history": lambda s, _: drawn(s, HISTORIES.values()),
     "stiffness": lambda s, _: s.positive(s.force / SMALL / s.size),
     "rest_length": lambda s, _: s.positive(s.size),
+    "Cable.nodes": lambda s, _: _line(s),
+    "Cable.pretension": lambda s, _: s.positive(s.force),
+    "Bar.stiffness": lambda s, _: s.positive(s.force / SMALL),
+    "Cable.stiffness": lambda s, _: s.positive(s.force / SMALL),
+    "bending": lambda s, _: s.positive(s.force * s.size**2),
+    "Spring.change": lambda s, _: s.about(SMALL * s.size),
+    "Cable.change": lambda s, _: s.about(SMALL * s.size),
+    "stiffness_history": lambda s, _: drawn(s, HISTORIES.values()),
     "Dashpot.coefficient": lambda s, _: s.positive(s.mass / s.time),
     "CreaseDamping.coefficient": lambda s, _: s.positive(s.force * s.time),
     "mass": lambda s, _: s.positive(s.mass),

@@ -25,7 +25,7 @@ from foldyn.structures.discretized import Discretized
 from foldyn.studies import find_case
 from foldyn.studies.herkal.calibration import shipped
 from foldyn.studies.herkal.runs import case_file_digest
-from foldyn.studies.herkal.specimen.evaluation import Response
+from foldyn.studies.herkal.specimen.evaluation import corner_peaks
 from foldyn.studies.pool import Task
 from verification.herkal.sensitivity import KEPT
 
@@ -182,10 +182,12 @@ def specimen_peaks(model: str) -> Rows:
     """
     own = {} if model == OWN else {k: v for k, v in MODELS[model].items() if k != "straight"}
     file = shipped("specimen-frf", {f"model.{key}": value for key, value in own.items()})
-    found = Response.of(file.run(file.masses[0]))
     return [
-        {"frequency": f, "damping": ratio if math.isfinite(ratio) else None}
-        for f, ratio in zip(found.frequencies, found.damping, strict=True)
+        {
+            "frequency": one.frequency,
+            "damping": one.textbook if math.isfinite(one.textbook) else None,
+        }
+        for one in corner_peaks(file.run(file.masses[0]))
     ]
 
 

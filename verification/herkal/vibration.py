@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import xarray
 
@@ -16,7 +16,7 @@ from foldyn.cases import Rayleigh
 from foldyn.linear import character
 from foldyn.signals import LogDecrement, log_decrement
 from foldyn.studies.herkal.calibration import IN_AIR, WATCHED, shipped
-from foldyn.studies.herkal.specimen.evaluation import Response
+from foldyn.studies.herkal.specimen.evaluation import corner_peaks
 from foldyn.studies.herkal.specimen.page import ORDINALS
 from foldyn.studies.herkal.targets import Verdict, verdicts
 from verification.herkal.calibration import peak
@@ -45,10 +45,17 @@ def specimen(
     return shipped(f"specimen-{name}", {**(changes or {}), **damped})
 
 
+class Peaks(NamedTuple):
+    """Frequencies (Hz) and damping ratios of peaks; these are nan without half-power points."""
+
+    frequencies: tuple[float, ...]
+    damping: tuple[float, ...]
+
+
 def response(
     published: bool = False, mass: str = "circumcenter", damping: Rayleigh = PAIR,
     air: bool = False, **changes: Any,
-) -> Response:  # fmt: skip
+) -> Peaks:  # fmt: skip
     """Peaks of the specimen's response to a sine of 0.001 N on each top node.
 
     Parameters
@@ -64,7 +71,8 @@ def response(
     """
     name = "frf-published" if published else "frf"
     damping = replace(damping, state="initial" if published else "rest")
-    return Response.of(specimen(name, damping, IN_AIR if air else None).run(mass, **changes))
+    found = corner_peaks(specimen(name, damping, IN_AIR if air else None).run(mass, **changes))
+    return Peaks(tuple(one.frequency for one in found), tuple(one.textbook for one in found))
 
 
 @dataclass(frozen=True, eq=False)

@@ -79,6 +79,8 @@ TIMELESS = (
 NO_BASE = (
     "a base moves over time, and a path has no time; give nodes, axis and displacement instead"
 )
+WOUND = SUPPORT.without("cable_change", "rest_change", base=NO_BASE, history=TIMELESS)
+"""Supports, of which cables and springs wind with the load factor."""
 
 
 class PathSection(AnalysisSection):
@@ -134,7 +136,7 @@ class PathSchema(CaseSchema):
     """A case file of kind "statics"."""
 
     model: PathModel = PathModel()
-    supports: Annotated[Sequence[Any], ListOf(SUPPORT.without(base=NO_BASE, history=TIMELESS))] = ()
+    supports: Annotated[Sequence[Any], ListOf(WOUND)] = ()
     loads: Annotated[Sequence[Any], ListOf(LOAD.without(history=TIMELESS))] = ()
     contact: Annotated[Contact | None, Check(still, why=TIMELESS), TableOf(Contact)] = None
     initial: StoredStart | None = None

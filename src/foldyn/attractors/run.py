@@ -96,7 +96,8 @@ def check_relaxing(case: Case, why: str) -> None:
     """Refuse hinges that yield or creep, for a reason."""
     if not all(part.law.relaxes for part in case.remembering):
         raise InputError(
-            f"structure: some of its hinges yield or creep, and {why}; take prony or an elastic law"
+            f"structure: some of its hinges yield, creep or have latches, and {why}; take prony or "
+            "an elastic law"
         )
 
 

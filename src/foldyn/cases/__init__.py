@@ -8,18 +8,22 @@ from foldyn.cases.contact import Contact, Plane
 from foldyn.cases.damping import CreaseDamping, ModalDamping, Rayleigh, StrainDamping
 from foldyn.cases.histories import *  # noqa: F403 - its __all__
 from foldyn.cases.history import Formula, Function, as_history
+from foldyn.cases.latches import Latch
 from foldyn.cases.loads import *  # noqa: F403
 from foldyn.cases.masses import PointMass
 from foldyn.cases.selection import resolve_nodes
+from foldyn.cases.springs import Bar, Cable, Spring
 from foldyn.cases.state import Continuation, Origin, State
 from foldyn.cases.stops import Stop
-from foldyn.cases.supports import SUPPORTS, BaseMotion, Fix, Impose, Link, Spring
+from foldyn.cases.supports import SUPPORTS, BaseMotion, Fix, Impose, Link
 from foldyn.patterns.selection import select
 
 __all__ = [
     "SUPPORTS",
     "Air",
+    "Bar",
     "BaseMotion",
+    "Cable",
     "Case",
     "Contact",
     "Continuation",
@@ -28,6 +32,7 @@ __all__ = [
     "Fix",
     "Function",
     "Impose",
+    "Latch",
     "Link",
     "ModalDamping",
     "Origin",

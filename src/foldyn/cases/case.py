@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -19,17 +19,20 @@ from foldyn.cases.clamped_edges import supported_points
 from foldyn.cases.contact import Contact
 from foldyn.cases.damping import Damping, Rayleigh, dampings
 from foldyn.cases.history import CONSTANT, History, as_history, factor
+from foldyn.cases.latches import Latch
 from foldyn.cases.loads import LOADS, Gravity, Load
 from foldyn.cases.masses import PointMass, nodal_masses
+from foldyn.cases.springs import Bar, Cable, Elastic, Made
 from foldyn.cases.state import State
 from foldyn.cases.supports import SUPPORTS, Fix, Impose, Link, Support
-from foldyn.errors import Faults, InputError, quietly, within
+from foldyn.errors import Faults, InputError, ModelRangeWarning, quietly, warn, within
 from foldyn.materials.inelastic_law import VARIABLES
 from foldyn.mechanics.air.added_mass import AddedMass
 from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.contact.board_term import BoardContactTerm
 from foldyn.mechanics.contact.boards import BoardSheets
 from foldyn.mechanics.contact.term import ContactTerm
+from foldyn.mechanics.springs import SpringsTerm
 from foldyn.patterns.picture import picture
 from foldyn.structures.boundary_elements import BoundaryElements
 from foldyn.structures.discretized import Discretized, read_only
@@ -180,7 +183,7 @@ class Case(Loaded, Damped):
             with faults.collected():
                 supported_points(self.structure, support, place)
         self._check_damping(faults)
-        for name in ("terms", "point_masses"):
+        for name in ("terms", "latches", "point_masses"):
             with faults.collected():
                 getattr(self, name)
         for place, load in self._loads():
@@ -216,8 +219,8 @@ class Case(Loaded, Damped):
         return self.structure.held(self.held_edges).with_terms(*self.terms)
 
     def elastic_body_at(self, time: float | None) -> Assembly:
-        """`elastic_body` with the rest angles at a time (s); None: as changed by constant loads."""
-        body, turns = self.elastic_body, self.rest_terms
+        """`elastic_body` as loads and winches set it at a time (s); None: as constant ones do."""
+        body, turns = self.elastic_body.at(lambda own: factor(own, time)), self.rest_terms
         if not turns:
             return body
         turned = sum(change * factor(history, time) for change, history in turns)
@@ -226,7 +229,14 @@ class Case(Loaded, Damped):
     @cached_property
     def remembering(self) -> tuple[Remembering, ...]:
         """Hinges with memory, by kind; `body` holds only the elastic parts of their laws."""
-        return remembering(self.structure, self.body, self.crease_damping)
+        own = remembering(self.structure, self.body, self.crease_damping)
+        return (*own, *self.latches)
+
+    @cached_property
+    def latches(self) -> tuple[Remembering, ...]:
+        """Hinges with latches, for each `Latch`."""
+        latches = self._supports(Latch)
+        return tuple(latch.remembering(self.structure, place) for place, latch in latches)
 
     def check_flow(self) -> None:
         """Refuse changes of rest angles for laws that yield or creep relative to the rest angle."""
@@ -267,6 +277,39 @@ class Case(Loaded, Damped):
         """Numbers of the contact planes that move, with their histories."""
         planes = enumerate(() if self.contact is None else self.contact.planes)
         return tuple((i, as_history(p.history)) for i, p in planes if p.history is not None)
+
+    @property
+    def lines(self) -> SpringsTerm | None:
+        """Springs with the bars and cables of the case, whose tensions results hold, if any."""
+        some = any(isinstance(support, Bar | Cable) for support in self.supports)
+        return self.elastic_body.find(SpringsTerm) if some else None
+
+    def polylines(self) -> list[tuple[Elastic, NDArray[np.int64], NDArray[np.float64]]]:
+        """Springs between nodes, bars and cables: the support, and nodes and rest positions.
+
+        Nodes (k,) are negative where a point (k, 3), m, stands still.
+        """
+        found = []
+        with quietly():
+            for place, part in self._supports(Elastic):
+                made = Made(self.structure)
+                part.add_to(made, place)
+                found += [(part, *points) for points in made.points]
+        return found
+
+    def pressed(self, tension: NDArray, named: Callable[[int], str]) -> None:
+        """Warn of bars beyond their buckling load, given tensions (k, c) in k states."""
+        limits = np.inf if self.lines is None else self.lines.limits
+        share = -np.asarray(tension) / limits
+        if share.size and share.max() > 1.0:
+            at, line = np.unravel_index(share.argmax(), share.shape)
+            warn(
+                f"bar (line {line}) is pressed with {share.max():.3g} times its buckling load at "
+                f"{named(int(at))}: it would bow, which the model leaves out; take stiffer bars, "
+                "or smaller loads",
+                "supports.md#bars",
+                ModelRangeWarning,
+            )
 
     @property
     def wind_terms(self) -> tuple[tuple[NDArray[np.float64], History], ...]:

@@ -17,6 +17,7 @@ from foldyn.cases.damping import CreaseDamping, Damping, ModalDamping, Rayleigh,
 from foldyn.cases.directions import AXES, unit_vector
 from foldyn.cases.history import History
 from foldyn.cases.loads import Gravity, Load
+from foldyn.cases.stops import Stop, StopDampersTerm, stop_dampers
 from foldyn.cases.supports import BaseMotion, Fix, Impose, Link
 from foldyn.errors import Faults, InputError
 from foldyn.mechanics.following import Following, pushes
@@ -179,7 +180,7 @@ class Supported:
     @cached_property
     def terms(self) -> tuple[Term, ...]:
         """Energy terms of the supports, one for each kind of support that stores energy."""
-        kinds = dict.fromkeys(type(support) for support in self.supports)
+        kinds = dict.fromkeys(support.family() for support in self.supports)
         terms = (kind.term(list(self._supports(kind)), self.structure) for kind in kinds)
         return tuple(term for term in terms if term is not None)
 
@@ -387,6 +388,11 @@ class Damped(Supported):
         """Dashpots among the supports, with their places for messages."""
         return tuple(self._supports(Dashpot))
 
+    @cached_property
+    def damped_stops(self) -> StopDampersTerm | None:
+        """The damping of end stops; None without any."""
+        return stop_dampers(list(self._supports(Stop)), self.structure)
+
     @property
     def damped_at_start(self) -> bool:
         """Whether any damping refers to the state in which a motion begins."""
@@ -399,7 +405,8 @@ class Damped(Supported):
         modal = self.modal_damping is not None and bool(np.any(self.modal_damping.ratios))
         dashpots = any(dashpot.coefficient > 0.0 for _, dashpot in self.dashpots)
         strain = self.strain_damping > 0.0
-        return rayleigh or modal or dashpots or strain or bool(self.crease_damping.any())
+        others = strain or bool(self.crease_damping.any()) or self.damped_stops is not None
+        return rayleigh or modal or dashpots or others
 
 
 def _union(numbers: Sequence[NDArray[np.int64]]) -> NDArray[np.int64]:

@@ -164,15 +164,20 @@ class Part(Checked):
         return None
 
     @classmethod
+    def family(cls) -> type[Part]:
+        """Kind whose parts, of all subclasses, make one term together."""
+        return cls
+
+    @classmethod
     def by_key(cls) -> dict[str, str]:
         """Names of the arguments by the keys of the table."""
         return {argument.key: name for name, argument in arguments(cls).items()}
 
     def table(self) -> dict[str, Any]:
-        """The part's table of plain values, without the history and arguments that are None."""
+        """The part's table of plain values, without histories and arguments that are None."""
         given = {key: getattr(self, name) for key, name in self.by_key().items()}
-        given.pop("history", None)
-        return {key: plain(value) for key, value in given.items() if value is not None}
+        some = {key: value for key, value in given.items() if not key.endswith("history")}
+        return {key: plain(value) for key, value in some.items() if value is not None}
 
 
 class PartOf(Check):
@@ -198,10 +203,13 @@ class PartOf(Check):
     ) -> None:
         super().__init__(self._read)
         self.kinds, self.section, self.asked, self.refused = kinds, section, asked, refused
+        self.unless: frozenset[str] = frozenset()
 
-    def without(self, **refused: str) -> PartOf:
-        """Copy that forbids some keys, each with the reason."""
-        return PartOf(self.kinds, self.section, self.asked, **refused)
+    def without(self, *unless: str, **refused: str) -> PartOf:
+        """Copy that forbids some keys, each with the reason, unless a table has certain others."""
+        other = PartOf(self.kinds, self.section, self.asked, **refused)
+        other.unless = frozenset(unless)
+        return other
 
     def schema(self, hint: Any, definitions: dict[str, Schema]) -> Schema:
         """See `Check`."""
@@ -209,7 +217,7 @@ class PartOf(Check):
 
     def _read(self, name: str, value: Any, folder: Path | None = None) -> Any:
         for key, why in self.refused.items():
-            if isinstance(value, Mapping) and key in value:
+            if isinstance(value, Mapping) and key in value and not (self.unless & value.keys()):
                 raise InputError(f" = {show(value[key])}: {why}", f"{name}.{key}")
         return self._made(name, value, folder)
 

@@ -286,10 +286,11 @@ class _Writer:
 
     def _part(self, part: Any) -> dict[str, Any]:
         section = part.table()
-        history = getattr(part, "history", STEADY)
-        if history != STEADY or "history" in part.missing:
-            moves = not isinstance(part, Load) or part.moves
-            section["history"] = self._history(history, moves)
+        for name in ("history", "stiffness_history"):
+            history = getattr(part, name, STEADY)
+            if history != STEADY or name in part.missing:
+                moves = not isinstance(part, Load) or part.moves
+                section[name] = self._history(history, moves)
         return section
 
     def _history(self, history: History, moves: bool) -> dict[str, Any]:

@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Annotated, Any, ClassVar, NamedTuple
+from typing import Annotated, Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,7 +29,7 @@ from foldyn.materials.inelastic_law import memory_of
 from foldyn.mechanics.dihedral import add_hessian, dihedrals_and_gradients, gradient_at
 from foldyn.mechanics.discrete_gradient import discrete_gradient, put_motion
 from foldyn.mechanics.model import ranks
-from foldyn.mechanics.sheet_term import NO_DOF
+from foldyn.mechanics.sheet_term import NO_DOF, FoldHinges
 from foldyn.mechanics.term import (
     ENERGIES,
     FORCES,
@@ -166,30 +166,25 @@ def _curvatures(stops, x, gradient, moment):
     return out
 
 
-class StopsTerm(Term):
-    """End stops of creases as a term; see `Term`."""
-
-    energy_groups: ClassVar[Mapping[str, str]] = {"strain_stops": "strain energy of end stops"}
-    undifferentiated: ClassVar[str] = "end stops"
+class BeyondAngles(Term):
+    """Base of terms that act where creases are beyond an angle; see `Term`."""
 
     def __init__(self, stops: Stops, rows: int) -> None:
         self.stops, self.rows = stops, rows
 
-    def compiled(self, part: Any, kept: Any, group: int) -> CompiledTerm:
-        """See `Term`."""
+    def context(self, group: int) -> Context:
+        """Context of the kernels."""
         scratch = _Scratch(*(np.zeros((4, 3)) for _ in _Scratch._fields))
-        own = Context(_Context(self.stops, scratch, group, self.rows))
-        return CompiledTerm(own, {FORCES: _forces, ENERGIES: _energies, MEAN_FORCES: _mean_forces})
+        return Context(_Context(self.stops, scratch, group, self.rows))
 
-    @property
-    def places(self) -> tuple[NDArray, NDArray]:
-        """See `Term`."""
+    def coupled(self) -> tuple[NDArray, NDArray]:
+        """Rows and columns (k,) of the dofs that turn a crease."""
         nodes = 3 * self.stops.hinges[:, :, None] + np.arange(3)
         dofs = np.hstack([nodes.reshape(-1, 12), self.stops.hidden])
         return np.repeat(dofs, 14, axis=1).ravel(), np.tile(dofs, (1, 14)).ravel()
 
-    def entries(self, q: NDArray, floor: float = -np.inf) -> NDArray:
-        """See `Term`."""
+    def resisted(self, q: NDArray) -> tuple[NDArray, NDArray, NDArray, NDArray]:
+        """Matrices (h, 14, 14) of what acts, its moments (h,), gradients (h, 12), positions."""
         stops, (angle, gradient, x) = self.stops, self._angles(q)
         beyond = angle - stops.limit
         acts = (stops.side == 0.0) | (stops.side * beyond > NOISE)
@@ -197,9 +192,7 @@ class StopsTerm(Term):
         rates = np.hstack([moved, -stops.turn])
         stiffness = acts * stops.stiffness
         out = np.einsum("h,ha,hb->hab", stiffness, rates, rates)
-        moment = np.where(np.isnan(stops.still), stiffness * beyond, 0.0)
-        out[:, :12, :12] += _curvatures(stops, x, gradient, moment).reshape(-1, 12, 12)
-        return out.ravel()
+        return out, np.where(np.isnan(stops.still), stiffness * beyond, 0.0), gradient, x
 
     def _angles(self, q: NDArray) -> tuple[NDArray, NDArray, NDArray]:
         """Angles (h,), gradients (h, 12) of the dihedrals, and positions of the nodes."""
@@ -208,6 +201,39 @@ class StopsTerm(Term):
         dihedral, gradient = dihedrals_and_gradients(x, stops.hinges)
         angle = np.where(np.isnan(stops.still), dihedral, stops.still)
         return angle - (stops.turn * flat_q[stops.hidden]).sum(axis=1), gradient, x
+
+    def placed(self, order: NDArray, before: Any) -> Self:
+        """See `Term`."""
+        own = self.stops
+        rest = np.ascontiguousarray(own.rest[order])
+        return type(self)(own._replace(rest=rest, hinges=ranks(order)[own.hinges]), self.rows)
+
+
+class StopsTerm(BeyondAngles):
+    """End stops of creases as a term; see `Term`."""
+
+    energy_groups: ClassVar[Mapping[str, str]] = {"strain_stops": "strain energy of end stops"}
+    undifferentiated: ClassVar[str] = "end stops"
+
+    def __init__(self, stops: Stops, rows: int) -> None:
+        super().__init__(stops, rows)
+        self.owns_hidden = bool(stops.turn.any())  # it turns with them
+
+    def compiled(self, part: Any, kept: Any, group: int) -> CompiledTerm:
+        """See `Term`."""
+        kernels = {FORCES: _forces, ENERGIES: _energies, MEAN_FORCES: _mean_forces}
+        return CompiledTerm(self.context(group), kernels)
+
+    @property
+    def places(self) -> tuple[NDArray, NDArray]:
+        """See `Term`."""
+        return self.coupled()
+
+    def entries(self, q: NDArray, floor: float = -np.inf) -> NDArray:
+        """See `Term`."""
+        out, moment, gradient, x = self.resisted(q)
+        out[:, :12, :12] += _curvatures(self.stops, x, gradient, moment).reshape(-1, 12, 12)
+        return out.ravel()
 
     def nominal(self, q: NDArray) -> StopsTerm:
         """The stops as springs that always act; see `Term`."""
@@ -218,19 +244,107 @@ class StopsTerm(Term):
         """See `Term`."""
         return float(self.stops.stiffness.sum())
 
-    def placed(self, order: NDArray, before: Any) -> StopsTerm:
+
+@forces
+def _resist(own, u, v, t, force, powers):
+    """Resist the rate of creases beyond their stops; in `stiffness` is the damping."""
+    stops, moved, out = own.stops, rows_at(u, own.rows), rows_at(force, own.rows)
+    speed, lost = rows_at(v, own.rows), 0.0
+    for h in range(stops.limit.size):
+        angle, found = _angle(stops, moved, h, own.scratch.points)
+        if _beyond(stops, h, angle) == 0.0:
+            continue
+        rate = 0.0
+        for side in range(2):
+            rate -= stops.turn[h, side] * flat(speed)[stops.hidden[h, side]]
+        if math.isnan(stops.still[h]):
+            for k in range(12):
+                rate += found[1 + k] * speed[stops.hinges[h, k // 3], k % 3]
+        _push(stops, h, stops.stiffness[h] * rate, found[1:], out)
+        lost += stops.stiffness[h] * rate * rate
+    numbers_at(powers, 2)[1] += lost
+
+
+class StopDampersTerm(BeyondAngles):
+    """Damping of end stops as a term; see `Term`."""
+
+    damps = True
+    undifferentiated: ClassVar[str] = "damped end stops"
+
+    def compiled(self, part: Any, kept: Any, group: int) -> CompiledTerm:
         """See `Term`."""
-        own = self.stops
-        rest = np.ascontiguousarray(own.rest[order])
-        return StopsTerm(own._replace(rest=rest, hinges=ranks(order)[own.hinges]), self.rows)
+        return CompiledTerm(self.context(group), {FORCES: _resist})
+
+    def nominal(self, q: NDArray) -> StopDampersTerm:
+        """Dampers that always act; see `Term`."""
+        return StopDampersTerm(self.stops._replace(side=np.zeros(len(self.stops.side))), self.rows)
+
+    @property
+    def damping_places(self) -> tuple[NDArray, NDArray]:
+        """See `Term`."""
+        return self.coupled()
+
+    def damping_entries(self, q: NDArray, hidden: float = 1.0) -> NDArray:
+        """See `Term`."""
+        out = self.resisted(q)[0]
+        out[:, :, 12:] *= hidden
+        return out.ravel()
 
 
-def _open_angles(name: str, value: Any) -> Any:
+def check_open_angles(name: str, value: Any) -> Any:
     """Angles (degrees) that a crease can pass, one or one for each."""
     checked = check_angles(name, value)
     if np.isin(checked, (0.0, 360.0)).any():
         raise InputError(f" = {show(value)}: panels cannot pass 0 or 360 degrees", name)
     return checked
+
+
+class OnHinges(NamedTuple):
+    """Springs that act on h hinges where their dihedrals have passed an angle."""
+
+    row: NDArray  # (h,) of the fold hinges
+    angle: NDArray  # (h,) rad
+    side: NDArray  # (h,) 1 if it acts above the angle, -1 below
+    stiffness: NDArray  # (h,) N m/rad, by which the hinge becomes stiffer
+    moment: NDArray  # (h,) N m/rad, of the spring itself per turn of the hinge
+
+
+def on_hinges(part: Any, structure: Discretized, folds: FoldHinges, place: str) -> OnHinges:
+    """Where the springs of a stop or a latch act on the hinges of folds.
+
+    In `plate`, whose panels are springs c in series with the crease and the spring beside it, these
+    two act as one on the dihedral; see the module's text.
+    """
+    creases = resolve_creases(structure, part.creases, f"{place}.creases")
+    angles, rest = np.zeros((2, len(structure.folds)))
+    given = one_or_each(f"{place}.angle", part.angle, len(creases), "creases")
+    angles[creases] = np.radians(given)
+    rest[creases] = structure.pattern.dihedrals[creases]
+    side = np.sign((angles - rest).round(DIGITS))
+    stated = getattr(part, "side", None)
+    if stated is not None:
+        side = np.full(len(rest), SIDES[stated])
+    same = creases[side[creases] == 0.0]
+    if len(same):
+        sided = 'stop; say on which side it acts, side = "below" or "above"'
+        rests = sided if hasattr(part, "side") else "latch; give an angle that it passes"
+        raise InputError(f"{place}.angle: crease {same[0]} rests at the {rests}")
+    passed = creases[(side * (rest - angles))[creases] > 0.0]
+    if len(passed):
+        raise InputError(
+            f"{place}.side = {show(stated)}: crease {passed[0]} is beyond the stop at rest, at "
+            f"{np.degrees(rest[passed[0]]):.4g} degrees; choose the other side, or another angle"
+        )
+    row = np.flatnonzero(np.isin(folds.fold, creases))
+    fold, soft = folds.fold[row], folds.softness[row]
+    crease = folds.stiffness[row] / (1.0 - soft * folds.stiffness[row])  # without its panels
+    memory = memory_of(structure.fold_law)
+    law, at = structure.fold_law if memory is None else memory.elastic, angles[fold]
+    slope = crease * law.slope(at, folds.rest[row])
+    own = part.stiffness * folds.length[row]
+    moment = own / (1.0 + soft * (slope + own))
+    angle = at + soft * crease * law.moment(at, folds.rest[row])
+    return OnHinges(row, angle, side[fold], moment / (1.0 + soft * slope), moment)
 
 
 @dataclass(frozen=True)
@@ -253,14 +367,19 @@ class Stop(Part):
     side : {"below", "above"}, optional
         The side of the angle on which it acts; by default the side on which the crease is not at
         rest.
+    damping : float
+        Damping per length of the crease (N m s/rad per m) while it acts, at least 0.
     """
 
     creases: Creases
-    angle: Annotated[PerCrease, Check(_open_angles, unit="degrees"), Key("stop")]
+    angle: Annotated[PerCrease, Check(check_open_angles, unit="degrees"), Key("stop")]
     stiffness: Annotated[
         float, Check(number, above=0.0, unit="N m/rad per m"), Key("stop_stiffness")
     ]
     side: Annotated[str | None, Check(choice, known=tuple(SIDES))] = None
+    damping: Annotated[
+        float, Check(number, least=0.0, unit="N m s/rad per m"), Key("stop_damping")
+    ] = 0.0
 
     apart = "stops of creases are a support of their own"
 
@@ -272,46 +391,40 @@ class Stop(Part):
                 f"{parts[0][0]}: superelements are linear, and stops are not; take bars and hinges "
                 "or a shell"
             )
-        folds = structure.body.sheet.fold_hinges()
-        found = [one._on(structure, folds, place) for place, one in parts]
-        row, limit, side, stiffness = (np.concatenate(each) for each in zip(*found, strict=True))
-        rest = np.ascontiguousarray(structure.nodes, float)
-        hidden = np.where(folds.hidden == NO_DOF, 0, folds.hidden)[row]
-        corners = np.arange(4 * len(row)).reshape(-1, 4)
-        still, _ = dihedrals_and_gradients(folds.corners[row].reshape(-1, 3), corners)
-        still = np.where(folds.alone[row], still, np.nan)
-        arrays = limit, side, stiffness, hidden, folds.hidden_turn[row], still
-        return StopsTerm(Stops(rest, folds.nodes[row], *arrays), structure.body.sheet.rows)
+        return StopsTerm(
+            _packed(parts, structure, lambda part, on, share: on.stiffness),
+            structure.body.sheet.rows,
+        )
 
-    def _on(self, structure: Discretized, folds: Any, place: str) -> tuple[NDArray, ...]:
-        """Hinges (h,), their limits and sides, and their stiffness, N m/rad."""
-        creases = resolve_creases(structure, self.creases, f"{place}.creases")
-        angles, rest = np.zeros((2, len(structure.folds)))
-        given = one_or_each(f"{place}.angle", self.angle, len(creases), "creases")
-        angles[creases] = np.radians(given)
-        rest[creases] = structure.pattern.dihedrals[creases]
-        side = np.sign((angles - rest).round(DIGITS))
-        if self.side is not None:
-            side = np.full(len(rest), SIDES[self.side])
-        same = creases[side[creases] == 0.0]
-        if len(same):
-            raise InputError(
-                f"{place}.angle: crease {same[0]} rests at the stop; say on which side it acts, "
-                'side = "below" or "above"'
-            )
-        passed = creases[(side * (rest - angles))[creases] > 0.0]
-        if len(passed):
-            raise InputError(
-                f"{place}.side = {show(self.side)}: crease {passed[0]} is beyond the stop at rest, "
-                f"at {np.degrees(rest[passed[0]]):.4g} degrees; choose the other side, or another "
-                "angle"
-            )
-        row = np.flatnonzero(np.isin(folds.fold, creases))
-        fold, soft = folds.fold[row], folds.softness[row]
-        crease = folds.stiffness[row] / (1.0 - soft * folds.stiffness[row])  # without its panels
-        memory = memory_of(structure.fold_law)
-        law, at = structure.fold_law if memory is None else memory.elastic, angles[fold]
-        slope = crease * law.slope(at, folds.rest[row])
-        own = self.stiffness * folds.length[row]
-        own = own / ((1.0 + soft * slope) * (1.0 + soft * (slope + own)))
-        return row, at + soft * crease * law.moment(at, folds.rest[row]), side[fold], own
+
+def stop_dampers(
+    parts: Sequence[tuple[str, Stop]], structure: Discretized
+) -> StopDampersTerm | None:
+    """Damping of stops, each with its place; None without any."""
+    damped = [(place, part) for place, part in parts if part.damping]
+    if not damped:
+        return None
+    own = _packed(
+        damped, structure,
+        lambda part, on, share: part.damping / part.stiffness * on.moment * share,
+    )  # fmt: skip
+    return StopDampersTerm(own, structure.body.sheet.rows)
+
+
+def _packed(parts: Sequence[tuple[str, Any]], structure: Discretized, strength: Any) -> Stops:
+    """Arrays of stops with the strengths (h,) of each, by where it acts and its share of a turn."""
+    folds = structure.body.sheet.fold_hinges()
+    found = [(part, on_hinges(part, structure, folds, place)) for place, part in parts]
+    own = [
+        strength(part, on, on.moment / (part.stiffness * folds.length[on.row]))
+        for part, on in found
+    ]
+    row, limit, side, _, _ = map(np.concatenate, zip(*(on for _, on in found), strict=True))
+    stiffness = np.concatenate(own)
+    rest = np.ascontiguousarray(structure.nodes, float)
+    hidden = np.where(folds.hidden == NO_DOF, 0, folds.hidden)[row]
+    corners = np.arange(4 * len(row)).reshape(-1, 4)
+    still, _ = dihedrals_and_gradients(folds.corners[row].reshape(-1, 3), corners)
+    still = np.where(folds.alone[row], still, np.nan)
+    arrays = limit, side, stiffness, hidden, folds.hidden_turn[row], still
+    return Stops(rest, folds.nodes[row], *arrays)

@@ -9,11 +9,13 @@ from typing import Annotated, Any, get_args
 import numpy as np
 
 from foldyn.arguments import Check, Flag, Key
-from foldyn.cases.connectors import Dashpot, Spring
+from foldyn.cases.connectors import Dashpot
 from foldyn.cases.decode import Factor, Part, PartOf
 from foldyn.cases.directions import AXES, Axes, Axis, Direction
 from foldyn.cases.history import STEADY
+from foldyn.cases.latches import Latch
 from foldyn.cases.selection import Nodes
+from foldyn.cases.springs import Bar, Cable, Spring
 from foldyn.cases.stops import Stop
 from foldyn.errors import InputError
 from foldyn.values import indices, number, number_or_list, one_or_each, show
@@ -187,7 +189,7 @@ class Link(Part):
             )
 
 
-Support = Fix | Impose | BaseMotion | Spring | Stop | Dashpot | Link
+Support = Fix | Impose | BaseMotion | Spring | Bar | Cable | Stop | Latch | Dashpot | Link
 SUPPORTS: tuple[type[Support], ...] = get_args(Support)
 
 
@@ -196,6 +198,8 @@ SUPPORT = PartOf(
     "supports",
     "nodes and axes or direction (held), nodes, axis and displacement (moved), base and history (a "
     "base that moves), nodes and link or to (tied together), or nodes or between with stiffness "
-    "(springs) or dashpot (damped), or stop and stop_stiffness (creases that push back)",
+    "(springs) or dashpot (damped), stop and stop_stiffness (creases that push back), latch "
+    "and latch_stiffness (creases that snap in), bar and bar_stiffness (struts), or cable and "
+    "cable_stiffness",
 )
 """A support in a case file."""

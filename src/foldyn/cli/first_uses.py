@@ -34,6 +34,7 @@ SPRINGS = [
     fd.Spring(2e3, "xmax", direction=(0, 1, 1)),
     fd.Spring(2e3, between=[(0, 6), (2, 8)], rest_length=1.0),
 ]
+WOUND = [*SPRINGS, fd.Cable([0, 6, 8], 1e3, rest_length=2.5, change=-0.1, history=RISE)]
 TIED = [fd.Link("xmax", "xz")]
 MOVING = [fd.BaseMotion("z", PULSE, 0.05), fd.Impose("xmax", "z", -0.1, RISE)]
 TURNING = [fd.Temperature(20.0, 1e-3, 5e-3, history=RISE), fd.Actuate([0], fraction=0.1)]
@@ -169,7 +170,7 @@ STAGES: Sequence[Uses] = (
             apart,
         ],
         "explicit methods": [
-            partial(moved, *EXPLICIT, supports=[*SPRINGS, *TIED], damping=DAMPED),
+            partial(moved, *EXPLICIT, supports=[*WOUND, *TIED], damping=DAMPED),
             partial(moved, *EXPLICIT, supports=MOVING, loads=[*TURNING, *FOLLOWING]),
             partial(moved, *EXPLICIT, mass="consistent", clamped="xmin"),
         ],
@@ -198,7 +199,7 @@ STAGES: Sequence[Uses] = (
             adapted,
             jumped,
             accompanied,
-            partial(moved, *IMPLICIT, supports=[*SPRINGS, *TIED], damping=DAMPED),
+            partial(moved, *IMPLICIT, supports=[*WOUND, *TIED], damping=DAMPED),
             partial(moved, *IMPLICIT, supports=MOVING, loads=[*TURNING, *FOLLOWING]),
             partial(moved, *IMPLICIT, damping=[fd.ModalDamping(0.05, 4)], supports=DASHPOTS),
         ],
@@ -215,7 +216,7 @@ STAGES: Sequence[Uses] = (
     {
         "energy_momentum": [
             partial(moved, CONSERVING, fold_law="linear"),
-            partial(moved, CONSERVING, supports=SPRINGS, clamped="xmin"),
+            partial(moved, CONSERVING, supports=WOUND, clamped="xmin"),
             partial(moved, CONSERVING, model="n5b8e"),
             partial(moved, CONSERVING, membrane="bars"),
             partial(moved, CONSERVING, model="shell"),

@@ -63,10 +63,14 @@ def _tangent(body: Assembly, q: NDArray) -> sparse.csr_array:
     return sparse.csr_array(sparse.coo_array((data, (rows, columns)), (q.size, q.size)))
 
 
-def damping_matrix(case: Case, q: NDArray, quasi_static: bool = False) -> sparse.csr_array:
-    """Matrix (m, m), N s/m, of `dampers` at the dofs q (m,)."""
-    none = sparse.csr_array((q.size, q.size))
-    return sum((term.damping(q) for term in dampers(case, quasi_static)), none)
+def damping_matrix(
+    case: Case, q: NDArray, quasi_static: bool = False, most: bool = False
+) -> sparse.csr_array:
+    """Matrix (m, m), N s/m, of `dampers` at the dofs q (m,); with all that may act if `most`."""
+    none, terms = sparse.csr_array((q.size, q.size)), dampers(case, quasi_static)
+    if most:
+        terms = [term.nominal(q) or term for term in terms]
+    return sum((term.damping(q) for term in terms), none)
 
 
 def dampers(case: Case, quasi_static: bool = False) -> list[Term]:
@@ -106,6 +110,7 @@ def dampers(case: Case, quasi_static: bool = False) -> list[Term]:
     elements = _elements(case, body, nodes, ends, strength, quasi_static)
     if len(elements.coefficient):
         terms.append(ViscousTerm(elements))
+    terms += [] if case.damped_stops is None else [case.damped_stops]
     strains = body.strains() if case.strain_damping else None
     for own in () if strains is None else strains.membranes:
         resisting = own._replace(stiffness=case.strain_damping * own.stiffness)

@@ -58,6 +58,7 @@ class MeanStep(NamedTuple):
     case: ThreadCase
     terms: NDArray  # (k,) contexts of all terms but contact
     forces: NDArray  # (k,) mean-force kernels of these terms
+    drives: NDArray  # (k, 2) kernels that set them to factors of histories, or 0, and contexts
     powers: NDArray  # (3,) powers that these terms put in, dissipate and lose to air, W
     old: StepEnd
     new: StepEnd
@@ -85,9 +86,9 @@ class EnergyMomentum(Scheme):
         self._terms = terms = MeanForces(body, self.part)
         self._step = Context(
             MeanStep(
-                equation.case.value, terms.context, terms.kernel, terms.powers, self.old, self.new,
-                np.zeros_like(self.new.factor), self.shift, self.out, state.angle,
-                np.zeros((0, 3)) if touch is None else touch.force,
+                equation.case.value, terms.context, terms.kernel, terms.drive, terms.powers,
+                self.old, self.new, np.zeros_like(self.new.factor), self.shift, self.out,
+                state.angle, np.zeros((0, 3)) if touch is None else touch.force,
             )
         )  # fmt: skip
         self._before = 0.0  # length of the last step, s
@@ -121,10 +122,6 @@ class EnergyMomentum(Scheme):
         if self._contact is not None:
             place(self.packed.system, old.q + self.shift, old.w, t, s)
             self._contact.put(self.displacement(), s.displacement, old.factor, s.factor)
-        if self.air is not None and self.air.histories:
-            place(self.packed.system, old.q, old.w, t, s)
-            row = self.air.row
-            self.air.blow(0.5 * (old.factor[row, 0] + s.factor[row, 0]))
         return residual(self._step, h, t)
 
     def tangent(self, matrix: StepMatrix, before: NDArray, again: bool) -> None:
@@ -186,7 +183,11 @@ def residual(step, h, t):
     new.force[:] = 0.0
     step.powers[:] = 0.0
     middle = t - 0.5 * h
+    for k in range(mean.shape[0]):  # rates with which powers are works over the step
+        mean[k, 1] = (new.factor[k, 0] - old.factor[k, 0]) / h
     for k in range(step.terms.size):
+        if step.drives[k, 0] != 0:
+            run_at(step.drives[k, 0], (step.drives[k, 1], mean))
         if system.turns:  # terms that store the step's start also need its end
             turn(system.actuators, mean if k == 0 else new.factor)
         ends = step.terms[k], s.displacement, s.velocity

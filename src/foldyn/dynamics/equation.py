@@ -77,7 +77,7 @@ class LoopHandle(NamedTuple):
     step_error: int = 0  # error ratio of laws with memory
     offsets: int = 0  # work of offsets; 0 if no rest angles change
     spent: int = 0  # energy of terms; 0 if no rest angles change, or with fixed steps
-    limit: int = 0  # longest step that contact allows
+    limit: int = 0  # longest step that contact and cables allow
     gather: int = 0  # finds slow contacts, which get inertia
     slow_down: int = 0  # changes accelerations for this inertia
     slow_kinetic: int = 0  # kinetic energy of this inertia
@@ -376,7 +376,7 @@ class EquationOfMotion:
                 step_error=parts.step_error.at(case) if remembers and limited else 0,
                 offsets=parts.offsets.at(case) if system.turns else 0,
                 spent=parts.spent.at(case) if system.turns and slows else 0,
-                **contact_parts(case, limited and system.touches, slow),
+                **contact_parts(case, bool(held.terms.kernel[:, LIMIT].any()), slow),
             )
         )
         self._out: Samples | None = None

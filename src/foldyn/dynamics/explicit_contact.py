@@ -129,7 +129,7 @@ def _slow_down(m, w, a):
 
 @inner_scalar
 def longest_step(handle, q, w, a, dt, pace):
-    """Longest step (s), at most dt, that contact allows, after `acceleration` at q and w.
+    """Longest step (s), at most dt, that contact and cables allow, after `acceleration` at q and w.
 
     Call it once at the end of each step, before the next one.
 

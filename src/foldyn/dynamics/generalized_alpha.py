@@ -51,7 +51,7 @@ from foldyn.dynamics.ties import follow_masters
 from foldyn.jit.compiled import inner, kernel
 from foldyn.jit.context import Context, run_at
 from foldyn.jit.intrinsics import flat
-from foldyn.mechanics.term import FORCES
+from foldyn.mechanics.term import FORCES, PLACE_OBSTACLES
 
 ORDER = 2
 SPECTRAL_RADIUS = 0.8
@@ -152,6 +152,8 @@ class Alpha(Scheme):
             lost += damped
         if system.turns:
             done += _actuation(self.context, self.folds, self.part.fold_angle)
+        if len(self.driven):
+            done += _driving(self.context, self.driven, self.displacement(), self.moved(), h)
         return done, lost, to_air
 
     def change(self, h: float) -> NDArray:
@@ -285,6 +287,24 @@ def _taken_by(step, numbers, before, after):
     for i in range(other.size):
         work += 0.5 * (one[i] + other[i]) * du[i]
     return work
+
+
+@kernel
+def _driving(step, driven, u0, u1, h):
+    """Work (J) of histories on terms in a step h (s): mean power, at the mean rates of the step."""
+    terms, s, done = step.case.terms, step.case.s, 0.0
+    for after in range(2):
+        for k in range(s.factor.shape[0]):
+            s.factor[k, 0] = step.new.factor[k, 0] if after else step.old.factor[k, 0]
+            s.factor[k, 1] = (step.new.factor[k, 0] - step.old.factor[k, 0]) / h
+        u = u1 if after else u0
+        for k in driven:
+            own, terms.powers[0] = terms.context[k], 0.0
+            run_at(terms.kernel[k, PLACE_OBSTACLES], (own, s.factor))
+            run_at(terms.kernel[k, FORCES], (own, u, u, 0.0, step.out, terms.powers))
+            done += 0.5 * h * terms.powers[0]
+    s.time[0] = np.nan  # the histories are to be evaluated again
+    return done
 
 
 @kernel

@@ -26,7 +26,7 @@ def with_memory(case: Case, body: Assembly, by: Numbering) -> Assembly:
     case.check_flow()
     state = memory_of_case(case)
     hinges = {"fold": body.sheet.fold_hinges, "bend": body.sheet.bend_hinges}
-    row = np.concatenate([hinges[part.kind]().row for part in parts])
+    row = np.concatenate([hinges[p.kind]().row[... if p.rows is None else p.rows] for p in parts])
     own = state.own._replace(dofs=by.dofs(state.own.dofs), row=row)
     return body.with_terms(HingeMemory(own, state.settles, body.sheet))
 
@@ -45,7 +45,7 @@ def instant_stiffness(case: Case, u: NDArray) -> sparse.csr_array | None:
     q = body.dofs(u)
     gradient = memory_of_case(case).gradients(q, body.size)
     added = [
-        part.stiffness * sum(branch.relaxed + branch.share for branch in part.branches)
+        part.stiffness * sum(own.relaxed + own.share + own.more for own in part.branches)
         for part in parts
     ]
     return sparse.csr_array(gradient.T @ sparse.diags_array(np.concatenate(added)) @ gradient)

@@ -26,10 +26,12 @@ from foldyn.errors import InputError, ModelRangeWarning, warn
 from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.following import following_force
 from foldyn.mechanics.inelastic import HingeMemory
+from foldyn.mechanics.springs import SpringsTerm
 from foldyn.results.contents import check_variable
 from foldyn.results.quantities import CONTINUATIONS, ORIGIN
 from foldyn.values import whole
 
+LOOKS = 201  # instants at which the lengths of cables are looked at
 AXES = "xyz"
 MODAL = "modal"  # the method of motions of superelements
 FIRST = 0.15  # ratio of first to largest step, divided by the fifth root of the tolerance
@@ -184,7 +186,19 @@ def _check_tied_velocity(case: Case, velocity: NDArray) -> None:
 
 
 def check_steady(case: Case, start: float, end: float) -> None:
-    """Refuse jumps of supports, planes and folds, and jumps of the wind with added mass."""
+    """Refuse jumps of supports, planes and folds, and of the wind with added mass.
+
+    Refuses cables that a winch would use up, too.
+    """
+    springs = case.elastic_body.find(SpringsTerm)
+    for time in np.linspace(start, end, LOOKS) if springs and springs.histories else ():
+        assert springs is not None
+        lines = springs.at(lambda history, time=time: float(history(time))).springs.lines
+        if (gone := np.flatnonzero(lines.scaled & (lines.natural + lines.now[:, 0] <= 0.0))).size:
+            raise InputError(
+                f"supports: the change of a cable (line {gone[0]}) leaves nothing of its "
+                f"{lines.natural[gone[0]]:.6g} m at t = {time:.6g} s; give a smaller change"
+            )
     for what, history in histories(case):
         times = [time for time in history.jumps() if start < time < end]
         drags = what == "the wind" and not (case.air and case.air.added_mass)
@@ -309,6 +323,9 @@ def begin(
     if len(body.hidden):  # massless dofs start in balance
         push = following_force(system.following, inward.ravel(), s.factor)
         resists = memory if memory is not None and memory.resists(remembered) else None
+        if memory is not None and memory.owns_hidden:  # latches that hold
+            memory.start(by.inward(u), remembered)
+            resists = None
         there = body.dofs(by.inward(u)[: len(u)], push, resists)
         inward.ravel()[body.hidden] = there[body.hidden]
         if len(mass.hidden):  # and so do their velocities

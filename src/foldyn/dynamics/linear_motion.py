@@ -15,6 +15,7 @@ from scipy import sparse
 from foldyn.cases import Case, Continuation, State
 from foldyn.cases.air import refuse_wind
 from foldyn.cases.constraints import AGREES
+from foldyn.cases.springs import refuse_driven
 from foldyn.dynamics import timing
 from foldyn.dynamics.audit import audited, energy_error
 from foldyn.dynamics.initial import MODAL, check_imposed, check_start, check_steady
@@ -84,6 +85,7 @@ def _refuse_nonlinear(case: Case) -> None:
             "linear: give drag = false, or take bars and hinges",
             "air",
         )
+    refuse_driven(case, "motions of superelements")
     if case.remembering:
         raise InputError(
             f": {case.remembering[0].law.name} has memory, which motions of superelements leave "

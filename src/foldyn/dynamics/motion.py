@@ -163,6 +163,9 @@ class Motion:
         result = self._dataset(crossings)
         if text := self._stretch(result):
             warn(text, "models.md#where-panels-stretch", StretchWarning)
+        if self.case.lines is not None:
+            tension, times = result["tension"].values, result["time"].values
+            self.case.pressed(tension, lambda at: f"t = {times[at]:.6g} s")
         return result
 
     def _stretch(self, result: xarray.Dataset) -> str:

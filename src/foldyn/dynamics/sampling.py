@@ -14,7 +14,7 @@ from foldyn.errors import FoldynError, InputError
 from foldyn.mechanics.contact.term import ContactTerm
 from foldyn.results import Quantity
 from foldyn.results.dataset import TAKEN
-from foldyn.results.quantities import CONTACT
+from foldyn.results.quantities import CONTACT, TENSION
 from foldyn.values import show
 
 CONTACT_FORCE, PLANE_FORCE = CONTACT
@@ -47,7 +47,7 @@ class Sampler:
     def __init__(self, case: Case, given: Any, u: NDArray, v: NDArray, start: float) -> None:
         if not isinstance(given, Mapping):
             raise InputError(f" = {show(given)}: give functions by name, as {{'tip': f}}", "sample")
-        structure, own = case.structure, _contact_quantities(case)
+        structure, own = case.structure, _forces_inside(case)
         taken = {*TAKEN, *case.energy_groups, *own}
         sizes = {"node": len(structure.nodes), "axis": 3, "support": len(case.reaction_dofs)}
         self._quantities: dict[str, tuple[Quantity, tuple[int, ...]]] = {}  # with their shapes
@@ -131,6 +131,18 @@ def _value(quantity: Quantity, u: NDArray, v: NDArray, time: float) -> NDArray:
     if not np.isfinite(value).all():
         raise SamplingError(f"returned {show(given)}; give finite numbers")
     return value
+
+
+def _forces_inside(case: Case) -> dict[str, Quantity]:
+    """Quantities that are sampled with bars, cables and contact; empty without these."""
+    lines = case.lines
+
+    def pulls(u: NDArray, v: NDArray, time: float) -> NDArray:
+        assert lines is not None
+        return lines.at(lambda history: float(history(time))).pulls(u)
+
+    own = {} if lines is None else {"tension": TENSION._replace(function=pulls)}
+    return own | _contact_quantities(case)
 
 
 def _contact_quantities(case: Case) -> dict[str, Quantity]:

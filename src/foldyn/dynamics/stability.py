@@ -150,7 +150,7 @@ def hidden_inertia(case: Case) -> NDArray:
         scale = float((local[free] / mass[free]).max())
         nodal = _quotient_of(case, stiffness, np.asarray(case.free_dofs), case.free_mass)
         rounded = max(round(_PER_OCTAVE * math.log2(nodal / scale)) / _PER_OCTAVE, _LEAST)
-        damping = abs(damping_matrix(case, case.body.dofs(_state(case, None))))
+        damping = abs(damping_matrix(case, case.body.dofs(_state(case, None)), most=True))
         damped = np.asarray(damping[hidden][:, hidden].sum(axis=1)).ravel()
         damped += case.rayleigh.beta * whole
         square = scale * 2.0**rounded
@@ -176,7 +176,7 @@ def damper_rate(case: Case, u: ArrayLike | None = None) -> float:
     """Largest damping rate (1/s) of dashpots, creases and strain damping about u (n, 3)."""
     if not case.dashpots and not case.crease_damping.any() and not case.strain_damping:
         return 0.0
-    return _largest_quotient(case, damping_matrix(case, case.body.dofs(_state(case, u))))
+    return _largest_quotient(case, damping_matrix(case, case.body.dofs(_state(case, u)), most=True))
 
 
 def _tangent(case: Case, u: ArrayLike | None) -> sparse.csr_array:

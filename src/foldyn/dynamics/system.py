@@ -60,7 +60,7 @@ class System(NamedTuple):
     turns: bool  # whether rest angles change
     follows: bool  # whether loads depend on the displacement
     touches: bool  # whether there is contact
-    presses: bool  # whether obstacles move or a wind varies
+    presses: bool  # whether obstacles move, a wind varies, or springs follow histories
     rows: int  # rows of arrays: n, plus rows for hidden dofs
     energies: int  # number of strain energy groups
     order: NDArray  # (n,) node number of each place in memory
@@ -136,7 +136,8 @@ def pack(
     histories: list[History] = []
     forces, supports = (*case.load_terms, *case.following_terms), case.imposed_terms
     others = (*case.base_terms, *case.rest_terms, *case.obstacle_terms, *case.wind_terms)
-    for _, history in (*forces, *supports, *others):
+    driving = case.elastic_body.histories
+    for history in (*(own for _, own in (*forces, *supports, *others)), *driving):
         if history not in histories:
             histories.append(history)
     modal = modal_rows(case, start) if modal is None else modal
@@ -162,7 +163,7 @@ def pack(
         turns=len(turned.hinge) > 0,
         follows=following.acts,
         touches=case.contact is not None,
-        presses=bool(case.obstacle_terms or case.wind_terms),
+        presses=bool(case.obstacle_terms or case.wind_terms or driving),
         rows=by.rows,
         energies=len(body.energy_groups),
         order=by.order,
@@ -187,11 +188,10 @@ def pack(
 
 
 def _driven(case: Case, histories: list[History]) -> Assembly:
-    """Body of a case, whose obstacles follow the given histories."""
-    if not case.obstacle_terms:
-        return case.body
+    """Body of a case, whose springs and obstacles follow the given histories."""
     rows = {plane: histories.index(history) for plane, history in case.obstacle_terms}
-    return case.elastic_body.with_terms(case.contact_term.driven(rows))
+    body = case.body if not rows else case.elastic_body.with_terms(case.contact_term.driven(rows))
+    return body.driven_by(histories) if case.elastic_body.histories else body
 
 
 def _entries(terms, histories) -> Entries:

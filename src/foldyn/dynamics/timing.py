@@ -199,6 +199,7 @@ def histories(case: Case) -> Iterator[tuple[str, History]]:
         "a base motion": case.base_terms,
         "the wind": case.wind_terms,
         "a plane": case.obstacle_terms,
+        "a spring or cable": [(None, history) for history in case.elastic_body.histories],
         "an actuation": [(turn, history) for turn, history in case.rest_terms if turn[:rest].any()],
     }
     for what, terms in driven.items():

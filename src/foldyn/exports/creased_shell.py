@@ -293,7 +293,11 @@ def _check(case: Case) -> None:
         ),
         (case.imposed.any(), "supports", "move nodes; hold them with Fix, and load them"),
         (case.constraints, "supports", "hold oblique directions or tie nodes; hold axes"),
-        (case.terms, "supports", "have springs or end stops; leave them out"),
+        (
+            case.terms or case.latches,
+            "supports",
+            "have springs, bars, cables, end stops or latches; leave them out",
+        ),
         (case.following_terms, "loads", "follow the sheet or come from temperature; give forces"),
         (case.contact, "contact", "leave it out: decks have no contact"),
         (case.air, "air", "leave it out: decks have no air"),

@@ -86,7 +86,7 @@ def _asked(result: xr.Dataset, rows: Any, tables: dict[Rows, list[str]]) -> Rows
     along = ALONG[result.attrs["foldyn_result"]]
     if rows is None:
         usual = ((along, "node"), (along, "model"), (along,))
-        return next(table for table in usual if table in tables)
+        return next(table for table in (*usual, *tables) if table in tables)
     asked = sorted(part.strip() for part in rows.split(",")) if isinstance(rows, str) else None
     for table in tables:
         if sorted(table) == asked:

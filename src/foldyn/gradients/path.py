@@ -226,7 +226,7 @@ def _refuse(case: Case, arguments: Mapping[str, Any]) -> None:
     """Refuse paths without derivatives, with a remedy."""
     lacks = {
         "contact": case.contact is not None,
-        "creases that yield, creep or relax": bool(case.remembering),
+        "creases that yield, creep or relax, and latches": bool(case.remembering),
         "folds that are actuated (Actuate, Temperature)": bool(case.rest_terms),
         "loads that depend on the displacement (Pressure, CreaseMoment), or act between the "
         "vertices of superelements": bool(case.following_terms),

@@ -25,6 +25,7 @@ from foldyn.algebra.substructures import Substructures
 from foldyn.algebra.superlu import SingularTangentError, Solution, unsymmetric
 from foldyn.cases import Case, Load
 from foldyn.cases.connectors import Connector
+from foldyn.cases.springs import Elastic
 from foldyn.condensation import Superelements
 from foldyn.dynamics.modal_damping import soft_at_rest
 from foldyn.errors import ComputationError, InputError, warn
@@ -225,7 +226,7 @@ class PanelsBase(Base):
         meshes = structure.meshes
         self.case = shell_of(case, meshes.divisions[-2:][0], meshes.graded[-1].radius)
         assert isinstance(self.case.structure, Shell)
-        springs = [one for one in self.case.supports if isinstance(one, Connector)]
+        springs = [one for one in self.case.supports if isinstance(one, Connector | Elastic)]
         self.problem = OrigamiProblem(self.case.altered(supports=springs))
         self.u = self.problem.start()
         self._shapes = _Shapes(own, self.case.structure)

@@ -18,11 +18,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.cases import Actuate, BaseMotion, Case, CreaseDamping, Fix, Impose, Link, Stop
+from foldyn.cases import Actuate, BaseMotion, Case, CreaseDamping, Fix, Impose, Latch, Link, Stop
 from foldyn.cases.air import refuse_air
 from foldyn.cases.directions import AXES, unit_vector
 from foldyn.cases.models import BARS_AND_HINGES, MODELS
 from foldyn.cases.selection import resolve_creases, resolve_nodes
+from foldyn.cases.springs import refuse_cables, refuse_varying
 from foldyn.condensation import Superelements
 from foldyn.condensation.panel import INNER
 from foldyn.errors import InputError, quietly
@@ -161,6 +162,8 @@ def _check(case: Case) -> None:
             ": cells do not touch each other; leave contact out of the case of a cell", "contact"
         )
     refuse_air(case, "an infinite sheet of cells")
+    refuse_cables(case.supports)
+    refuse_varying(case.supports)
     if case.modal_damping is not None:
         raise InputError(
             ": modes of one cell differ from modes of the sheet; take Rayleigh, crease or "
@@ -460,7 +463,7 @@ class Repeated:
             part = Fix(part.nodes, part.axis, part.direction, part.along)
         if isinstance(part, Link):
             return self._links(part, field)
-        if isinstance(part, Stop):
+        if isinstance(part, Stop | Latch):
             return [self._on_creases(part, field)]
         if getattr(part, "between", None) is not None:
             return self._between(part)
@@ -485,7 +488,7 @@ class Repeated:
 
     def _turned(self, part: Any, step: Step, **changes: Any) -> Any:
         """A copy of a support, with its direction (if any) turned with the cell."""
-        if part.direction is None or not self._turns:
+        if getattr(part, "direction", None) is None or not self._turns:
             return replace(part, **changes)
         way = rotation(self.lattice.cell.motions, step) @ unit_vector(part.direction)
         return replace(part, direction=tuple(way.tolist()), **changes)

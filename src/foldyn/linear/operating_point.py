@@ -18,7 +18,7 @@ from foldyn.mechanics.following import NO_POTENTIAL
 from foldyn.statics import OrigamiProblem, trace
 from foldyn.statics.equilibrium import drives, is_actuated
 from foldyn.statics.newton import Balance, Solver, balance
-from foldyn.statics.path_memory import AT_REST, REFUSED
+from foldyn.statics.path_memory import AT_REST, FOLLOWED, REFUSED, flowing
 from foldyn.statics.rigid import free_rigid_motions
 from foldyn.statics.tracing import displacement_of
 
@@ -74,7 +74,7 @@ def operating_point(
             "state",
         )
     if state is None:
-        point = _judge(case, np.zeros_like(case.structure.nodes), 0.0, "rest")
+        point = _judge(case, np.zeros_like(case.structure.nodes), None, 0.0, "rest")
         if any(getattr(load, "history", None) == STEADY for load in case.loads):
             _warn(
                 "state = None: the loads of the case do not act in the rest state; "
@@ -83,16 +83,19 @@ def operating_point(
     elif isinstance(state, str):
         if state != "equilibrium":
             raise InputError(f" = {state!r}: give {PLACES}", "state")
-        point = _judge(case, _equilibrium(case), 1.0, "equilibrium")
+        point = _judge(case, *_equilibrium(case), 1.0, "equilibrium")
     else:
-        point = _judge(case, displacement_of(state, case, "state", PLACES), load_factor, "state")
+        found = displacement_of(state, case, "state", PLACES)
+        memory = case.memory_in(state)
+        memory = memory[flowing(case, False)] if isinstance(memory, np.ndarray) else memory
+        point = _judge(case, found, memory, load_factor, "state")
     if point.relative > BALANCED:
         _warn(_imbalance(point, case))
     return point
 
 
-def _equilibrium(case: Case) -> NDArray:
-    """Displacement (n, 3), m, under the full loads of a case, near its rest state.
+def _equilibrium(case: Case) -> tuple[NDArray, NDArray | None]:
+    """Displacement (n, 3), m, under the full loads of a case, near its rest state; its memory.
 
     Superlinear hinges need one more Newton step: with a residual at round-off, a hinge at 1e-6 rad
     from rest is still off by 1e-4 of that turn, which affects its slope.
@@ -106,22 +109,27 @@ def _equilibrium(case: Case) -> NDArray:
             warnings.filterwarnings("ignore", told, FoldynWarning)
         path = trace(case, "newton", load_factors=factors, inertia_relief=free)
     found = path["displacement"].values[-1]
+    memory = path["memory"].values[-1][flowing(case, False)] if case.latches else None
     if len(body.sheet.soft_hinges(body.dofs(found)).offset):
-        problem = OrigamiProblem(case, inertia_relief=free)
+        problem = OrigamiProblem(case, inertia_relief=free, flow=_flow(case), memory=memory)
         again = Solver(problem).correct(problem.state(found, factors[-1]), factors[-1])
-        return problem.displacement(again.u)
-    return found
+        return problem.displacement(again.u), memory
+    return found, memory
 
 
-def _judge(case: Case, displacement: NDArray, factor: float, kind: str) -> OperatingPoint:
+def _judge(
+    case: Case, displacement: NDArray, memory: NDArray | str | None, factor: float, kind: str
+) -> OperatingPoint:
     """The operating point of a state, with its residual.
+
+    Latches hold as the memory of the state says.
 
     Forces with a fixed direction do not enter the tangent, and a state does not record their
     factors: each load gets the factor that minimizes the residual. Loads that depend on the
     displacement act with the factor of actuated folds.
     """
-    flow = AT_REST if kind == "rest" else REFUSED
-    problem = OrigamiProblem(case, (), displacement, flow=flow)
+    flow = AT_REST if kind == "rest" else _flow(case)
+    problem = OrigamiProblem(case, (), displacement, flow=flow, memory=memory)
     reached = problem.state(displacement, factor)
     body, u, free = problem.body(reached, factor), problem.dofs(reached), problem.free
     residual = problem.projected(body.internal(u) - problem.following_force(u, factor))
@@ -136,6 +144,12 @@ def _judge(case: Case, displacement: NDArray, factor: float, kind: str) -> Opera
     return OperatingPoint(displacement, problem, factor, body, u, found, kind)
 
 
+def _flow(case: Case) -> str:
+    """How the memory of a case counts: latches hold, but nothing yields."""
+    only = all(part.rows is not None or part.law.relaxes for part in case.remembering)
+    return FOLLOWED if case.latches and only else REFUSED
+
+
 def _load_vectors(case: Case, body: Assembly) -> NDArray:
     """Forces (m, loads), N, of each load in full."""
     alone = [SomeLoads(case, [i]) for i in range(len(case.loads))]
@@ -148,7 +162,8 @@ def _load_vectors(case: Case, body: Assembly) -> NDArray:
 
 def _imbalance(point: OperatingPoint, case: Case) -> str:
     """Warning that a state is not an equilibrium, with a remedy."""
-    driven = "actuated folds" if is_actuated(case) else ""
+    driven = "springs and cables with a history" if case.elastic_body.histories else ""
+    driven = "actuated folds" if is_actuated(case) else driven
     driven = "pressure and moments of creases" if case.following_terms else driven
     remedy = {
         "rest": "state = 'equilibrium' finds the equilibrium that belongs to it",

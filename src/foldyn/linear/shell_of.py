@@ -78,7 +78,9 @@ def _numbered(case: Case) -> Iterator[tuple[str, list[int]]]:
             for key in ("nodes", "between", "to"):
                 given = getattr(part, key, None)
                 if given is not None and not isinstance(given, str):
-                    yield f"{name}[{i}].{key}", np.ravel(given).tolist()
+                    found = (np.ravel(one) for one in np.atleast_1d(np.array(given, object)))
+                    nodes = [one[0] for one in found if len(one) == 1]  # no points
+                    yield f"{name}[{i}].{key}", nodes
 
 
 def shell_of(case: Case, divisions: int, vertex_radius: float | None = None) -> Case:

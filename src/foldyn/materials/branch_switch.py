@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from foldyn.jit.switches import by_code, switch
-from foldyn.materials import eyring, plastic, prony
+from foldyn.materials import eyring, latching, plastic, prony
 
 MEMORY_LAWS = (prony.Prony, plastic.Plastic, eyring.Eyring)
-_BRANCHES = by_code({law.__name__: law.formulas for law in MEMORY_LAWS})
+_KINDS = (*MEMORY_LAWS, latching.Latching)  # latches are no law of creases
+_BRANCHES = by_code({law.__name__: law.formulas for law in _KINDS})
 _ARGUMENTS = "p, before, after, dt, one, other"
 
 

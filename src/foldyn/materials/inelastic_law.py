@@ -37,6 +37,7 @@ class Branch(NamedTuple):
     relaxed: float
     share: float | NDArray  # (n,)
     rate: NDArray  # (n,) 1/s
+    more: float | NDArray = 0.0  # stiffness that the branch can have besides
 
 
 class MemoryLaw(HingeLaw):

@@ -125,7 +125,7 @@ class AirDragTerm(Term):
     undifferentiated = "drag of the air"
 
     def __init__(self, air: AirDrag, half: float, row: int = 0, histories: int = 0) -> None:
-        self.air, self.half, self.row, self.histories = air, half, row, histories
+        self.air, self.half, self.row, self._count = air, half, row, histories
 
     def driven(self, row: int, histories: int) -> AirDragTerm:
         """Copy with a wind that follows history number `row` of `histories`."""
@@ -134,13 +134,9 @@ class AirDragTerm(Term):
     def compiled(self, part: Any, kept: Any, group: int) -> CompiledTerm:
         """Context and kernels for a thread; see `Term`."""
         rows = int(part.own[1])
-        own = Context(_Context(self.air, self.half, self.row, self.histories, rows))
-        kernels = {FORCES: _forces} | ({PLACE_OBSTACLES: _place} if self.histories else {})
+        own = Context(_Context(self.air, self.half, self.row, self._count, rows))
+        kernels = {FORCES: _forces} | ({PLACE_OBSTACLES: _place} if self._count else {})
         return CompiledTerm(own, kernels)
-
-    def blow(self, factor: float) -> None:
-        """Set the wind factor for the next evaluations."""
-        self.air.factor[0] = factor
 
     @cached_property
     def damping_places(self) -> tuple[NDArray, NDArray]:
@@ -160,4 +156,4 @@ class AirDragTerm(Term):
     def placed(self, order: NDArray, before: Any) -> AirDragTerm:
         """The term with nodes in memory order; see `Term`."""
         here = self.air._replace(triangles=ranks(order)[self.air.triangles])
-        return AirDragTerm(here, self.half, self.row, self.histories)
+        return AirDragTerm(here, self.half, self.row, self._count)

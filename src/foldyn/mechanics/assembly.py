@@ -11,7 +11,7 @@ memory follow. They are added in list order. Methods that derive another assembl
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from itertools import compress
 from typing import Any, NamedTuple, TypeVar
@@ -319,6 +319,21 @@ class Assembly:
     def folded(self, rest: NDArray) -> Assembly:
         """Assembly with other rest angles (nr,), rad."""
         return self.on(self.sheet.folded(rest))
+
+    @property
+    def histories(self) -> tuple[Any, ...]:
+        """Histories that drive terms."""
+        return tuple(dict.fromkeys(each for term in self.others for each in term.histories))
+
+    def at(self, factor: Callable[[Any], float]) -> Assembly:
+        """Assembly with what follows histories at their factors."""
+        if not self.histories:
+            return self
+        return Assembly(self.sheet, *(term.at(factor) for term in self.others))
+
+    def driven_by(self, histories: Sequence[Any]) -> Assembly:
+        """Assembly for a motion; see `Term`."""
+        return Assembly(self.sheet, *(term.driven_by(histories) for term in self.others))
 
     def anchored(self, place: NDArray) -> Assembly:
         """Assembly of the elements whose lowest place is 0; see `Term`."""

@@ -19,6 +19,7 @@ from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.jit.context import Context, numbers_at, rows_at
 from foldyn.jit.intrinsics import flat
 from foldyn.materials.branch_switch import mean_moment, update
+from foldyn.materials.latching import CODE as LATCH
 from foldyn.mechanics.dihedral import add_hessian
 from foldyn.mechanics.discrete_gradient import discrete_gradient
 from foldyn.mechanics.sheet_term import SheetTerm
@@ -330,6 +331,7 @@ class HingeMemory(Term):
     def __init__(self, own: MemoryHinges, settles: NDArray, sheet: SheetTerm) -> None:
         self.own, self.settles = own, settles
         self._offset, self._rows = sheet.series()[1], sheet.rows
+        self.owns_hidden = bool((own.code == LATCH).any() and own.hidden_turn.any())
 
     def start(self, q: NDArray, state: NDArray | str | None = None) -> None:
         """Start at the dofs q (m,) or (rows, 3) in a state (b, 2), "fresh", or the default."""

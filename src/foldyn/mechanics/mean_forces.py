@@ -25,7 +25,15 @@ from foldyn.jit.context import Context, numbers_at, rows_at, run_at
 from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.contact.term import ContactTerm
-from foldyn.mechanics.term import ENERGIES, FORCES, MEAN_FORCES, CompiledTerm, Term, mean_forces
+from foldyn.mechanics.term import (
+    ENERGIES,
+    FORCES,
+    MEAN_FORCES,
+    PLACE_OBSTACLES,
+    CompiledTerm,
+    Term,
+    mean_forces,
+)
 from foldyn.mechanics.threads import ThreadPart
 
 NOISE = 16.0 * float(np.finfo(float).eps)  # rounding errors, relative to an energy
@@ -90,6 +98,8 @@ class MeanForces:
     ----------
     context, kernel : ndarray, shape (k,)
         Addresses.
+    drive : ndarray, shape (k, 2)
+        Kernels that set terms to factors of histories, or 0, and their contexts.
     powers : ndarray, shape (3,)
         Powers that forces without energy put in, dissipate and lose to the air, W.
     """
@@ -97,13 +107,14 @@ class MeanForces:
     def __init__(self, body: Assembly, part: ThreadPart) -> None:
         self.powers, self._body = np.zeros(3), body
         pairs = zip(body.terms, body.compiled(part), strict=True)
-        self._held = [
-            (own.context, *self._of(term, own))
-            for term, own in pairs
-            if not isinstance(term, ContactTerm)
-        ]
+        kept = [(term, own) for term, own in pairs if not isinstance(term, ContactTerm)]
+        self._held = [(own, *self._of(term, own)) for term, own in kept]
         self.context = np.array([context.address for _, context, _ in self._held], np.int64)
         self.kernel = np.array([kernel.at(context) for _, context, kernel in self._held], np.int64)
+        self.drive = np.zeros((len(kept), 2), np.int64)
+        for row, (_, own) in zip(self.drive, kept, strict=True):
+            if PLACE_OBSTACLES in own.kernels:
+                row[:] = own.kernels[PLACE_OBSTACLES].at(own.context), own.context.address
 
     def _of(self, term: Term, own: CompiledTerm) -> tuple[Context, Addressed]:
         """Context and kernel of a term."""

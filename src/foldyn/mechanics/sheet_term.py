@@ -56,6 +56,11 @@ class FoldHinges(NamedTuple):
         """Length (k,) of each hinge, m."""
         return np.linalg.norm(self.corners[:, 1] - self.corners[:, 0], axis=1)
 
+    def some(self, rows: NDArray) -> FoldHinges:
+        """Some of the hinges."""
+        chosen: Any = (np.asarray(each)[rows] if np.ndim(each) else each for each in self)
+        return FoldHinges(*chosen)
+
     @property
     def share(self) -> NDArray:
         """Ratio (k,) of each hinge's length to the length of its whole fold."""

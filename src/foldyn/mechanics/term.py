@@ -16,12 +16,14 @@ force are (rows, 3), as in `mechanics.assembly`. The signatures, after the addre
     energies(u, out)                 adds the term's energies to their groups; the sheet's kernel
                                      overwrites `out`
     limit(u, v, a, h, beta, energy, lightness) -> h
-                                     the longest step (s), at most h, that resolves all contacts:
+                                     the longest step (s), at most h, that resolves all contacts
+                                     and ends where a cable goes slack or taut:
                                      called before each step, after the forces at the end of the
                                      last step; a is the acceleration at that end, beta and energy
                                      are the fields of `contact.step_limit.Pace`; lightness (n,) is
                                      1 / mass of the nodes, 1/kg
-    place_obstacles(factors)         sets obstacles and air to the factors (h, 3) of their histories
+    place_obstacles(factors)         sets obstacles, air and springs to the factors (h, 3) of their
+                                     histories
     advance_clock(since)             the next evaluation is `since` (s) after the last accepted step
     commit()                         accepts the step that ends at the last evaluation
     dissipated() -> J                energy that the term's laws have dissipated up to the last
@@ -138,6 +140,8 @@ class Term(ABC):
         Name for messages that refuse gradients, for a term without `pulled`.
     without : tuple of str
         "stiffness" or "damping" if solvers obtain it elsewhere, or the term has none.
+    histories : tuple of History
+        What drives the term, in addition to obstacles and air.
     """
 
     energy_groups: ClassVar[Mapping[str, str]] = {}
@@ -147,6 +151,7 @@ class Term(ABC):
     damps: ClassVar[bool] = False
     undifferentiated: ClassVar[str] = ""
     without: ClassVar[tuple[str, ...]] = ()
+    histories: tuple[Any, ...] = ()
 
     def __init_subclass__(cls, **options: Any) -> None:
         """Refuse a term class that lacks a part, which solvers would take for zero."""
@@ -287,6 +292,14 @@ class Term(ABC):
 
     def displaced(self, moved: NDArray) -> Self:
         """The term, with the same memory, with contact planes displaced by `moved` (p, 3), m."""
+        return self
+
+    def at(self, factor: Callable[[Any], float]) -> Self:
+        """The term with what follows its histories at their factors."""
+        return self
+
+    def driven_by(self, histories: Sequence[Any]) -> Self:
+        """A copy of the term for a motion, which numbers its histories among these."""
         return self
 
     def on(self, sheet: Any) -> Self:

@@ -27,6 +27,7 @@ from scipy.linalg import eigh
 from foldyn.attractors.drive import check_harmonic, lowest_frequency
 from foldyn.cases import Case, Constant, Harmonic, Origin
 from foldyn.cases.air import refuse_air
+from foldyn.cases.springs import refuse_driven
 from foldyn.dynamics.dampers import damping_terms
 from foldyn.dynamics.inertia import check_mass
 from foldyn.dynamics.modal_damping import mass_of, modal_rows
@@ -165,11 +166,12 @@ def check_smooth(case: Case, name: str) -> None:
             "contact.friction",
         )
     refuse_air(case, name)
+    refuse_driven(case, name)
     if case.remembering:
         raise InputError(
             f"structure: {name} takes forces that depend on the displacement alone, and some "
-            "hinges have memory (prony, plastic, or damped creases between compliant panels); take "
-            "an elastic law, or simulate the motion"
+            "hinges have memory (prony, plastic, damped creases between compliant panels, or "
+            "latches); take an elastic law without these, or simulate the motion"
         )
 
 

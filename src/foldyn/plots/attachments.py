@@ -7,10 +7,22 @@ from typing import Any
 import numpy as np
 from matplotlib.patches import Patch
 
-from foldyn.cases import Case, Dashpot, Fix, Impose, Link, resolve_nodes
+from foldyn.cases import (
+    Bar,
+    Cable,
+    Case,
+    Dashpot,
+    Fix,
+    Impose,
+    Latch,
+    Link,
+    Spring,
+    Stop,
+    resolve_nodes,
+)
 from foldyn.cases.directions import unit_vector
-from foldyn.cases.supports import Spring
-from foldyn.mechanics.springs import GROUND
+from foldyn.cases.selection import resolve_creases
+from foldyn.mechanics.lines import GROUND
 from foldyn.patterns.topology import around, edge_of
 from foldyn.plots import marks, style
 from foldyn.plots.marks import Mark
@@ -43,9 +55,30 @@ def springs_and_masses(
         if isinstance(part, Spring)
         for line in _of_part(sheet, points, part, f"supports[{i}]", size, view)
     ]
+    for kind, text, width in ((Bar, "bar", 2.2), (Cable, "cable", 1.1)):
+        lines = [
+            np.where(node[:, None] < 0, x, points[node])[None]
+            for part, node, x in (case.polylines() if supports else ())
+            if isinstance(part, kind)
+        ]
+        if lines:
+            key = style.key(text, color=style.SPRING, linewidth=width)
+            found.append(Mark(style.SPRING, [key], lines, zorder=6.5, width=width))
     if springs:
         key = style.key("spring", color=style.SPRING, linewidth=1.1)
         found.append(Mark(style.SPRING, [key], springs, zorder=6.5, width=1.1))
+    for kind, text, marker in ((Stop, "end stop", "s"), (Latch, "latch", "D")):
+        chosen = [
+            resolve_creases(sheet.structure, part.creases)
+            for part in (case.supports if supports else ())
+            if isinstance(part, kind)
+        ]
+        if chosen:
+            ends = sheet.structure.pattern.creases[np.unique(np.concatenate(chosen))]
+            look = {"marker": marker, "markersize": 5.5, "markeredgecolor": "white"}
+            key = style.key(text, color=style.SUPPORT, linestyle="none", **look)
+            dots = points[ends].mean(axis=1)
+            found.append(Mark(style.SUPPORT, [key], dots=dots, zorder=7.5, look=look))
     if loads and case.masses:
         there = np.flatnonzero(case.point_masses)
         own = case.point_masses[there]

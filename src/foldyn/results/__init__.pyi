@@ -1,6 +1,10 @@
 # Public names and where they live; loaded when they are first used (facade.py)
 
-from foldyn.results.contents import case_of as case_of, check_result as check_result
+from foldyn.results.contents import (
+    case_of as case_of,
+    check_result as check_result,
+    latched as latched,
+)
 from foldyn.results.dataset import (
     fidelity_dataset as fidelity_dataset,
     folding_dataset as folding_dataset,

@@ -10,6 +10,7 @@ import xarray as xr
 from foldyn.cases import Case
 from foldyn.cases.document import from_document, pattern_from_document
 from foldyn.errors import InputError
+from foldyn.materials.latching import Latching
 from foldyn.patterns import Pattern
 from foldyn.patterns.selection import given_as, select
 from foldyn.results.stored_case import document_of
@@ -143,3 +144,34 @@ def _numbers(result: xr.Dataset, nodes: int | str | Sequence[int], name: str) ->
             "nodes",
         )
     return [whole("nodes", node) for node in given]
+
+
+def latched(result: xr.Dataset) -> xr.DataArray:
+    """Whether a latch holds each crease in each state of a motion or a path.
+
+    Parameters
+    ----------
+    result : Dataset
+        From `fd.simulate` or `fd.trace`, of a case with latches.
+
+    Returns
+    -------
+    DataArray of bool
+        Along the states of the result and `crease`.
+
+    Raises
+    ------
+    InputError
+        The case has no latches.
+    """
+    case, at = case_of(result), 0
+    if not any(isinstance(part.law, Latching) for part in case.remembering):
+        raise InputError(": has no latches; give its case fd.Latch", "result")
+    state = result["memory"].transpose("branch", "variable", ...)[:, 0]
+    holds = np.zeros((len(case.structure.folds), state.shape[1]), bool)
+    for part in case.remembering:
+        if isinstance(part.law, Latching):
+            np.logical_or.at(holds, part.hinges.fold, state.values[at : at + part.count] > 0.0)
+        at += part.count
+    dims = str(state.dims[1]), "crease"
+    return xr.DataArray(holds.T, dims=dims, coords=result[dims[0]].coords)

@@ -53,6 +53,7 @@ CONTACT = {
     ),
 }
 """Variables of motions and paths with contact; `plane_force` only with planes."""
+TENSION = Quantity("N", "tension of springs, bars and cables", ("line",))
 MOTION: Mapping[str, Quantity] = STATE | {
     "velocity": Quantity("m/s", "velocity", PLACE),
     "kinetic": Quantity("J", "kinetic energy"),
@@ -78,6 +79,7 @@ SINCE = "since rest, or since the state from which a path was started"
 PATH: Mapping[str, Quantity] = {
     **STATE,
     **CONTACT,
+    "tension": TENSION,
     "plane_friction": Quantity("N", "friction of each plane on the sheet", ("plane", "axis")),
     "work": Quantity("J", f"work of loads, supports and actuators {SINCE}"),
     "negative_eigenvalues": Quantity(text="negative eigenvalues of the tangent (unstable if any)"),
@@ -268,6 +270,7 @@ REASONS: Mapping[str, str] = {
     "damped_ratio": "a rigid motion does not oscillate",
     "slope": "bands have corners where the frequency is zero",
     "group_velocity": "bands have corners where the frequency is zero",
+    "model_error": "rigid modes, and modes that superelements lack, are not compared",
     "damping_ratio": "a rigid or an unstable mode does not oscillate",
     "receptance": "a resonance without damping, a body free to move at 0 Hz, or no convergence",
     "transmissibility": "a resonance without damping, or no convergence",

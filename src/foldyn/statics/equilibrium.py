@@ -21,6 +21,7 @@ from foldyn.cases import Actuate, Case
 from foldyn.cases.air import refuse_air, refuse_wind
 from foldyn.cases.case_assembly import SomeLoads
 from foldyn.cases.heat import heat_of
+from foldyn.cases.springs import refuse_varying
 from foldyn.errors import InputError
 from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.contact.term import ContactTerm
@@ -100,12 +101,15 @@ class Plates:
 class Actuation:
     """A body whose rest angles change by `change` (nr,), rad, per unit of the load factor.
 
+    The lengths of springs and cables with a history change with it, too.
+
     A rest angle that leaves 0..2 pi becomes nan, which no solver accepts.
     """
 
     def __init__(self, body: Assembly, change: NDArray, constant: NDArray) -> None:
         self._body, self._change, self._constant = body, change, constant
-        self.acts = bool(change.any() or constant.any())
+        self._turns, self.acts = bool(change.any() or constant.any()), bool(body.histories)
+        self.acts |= self._turns
         self.body = lru_cache(maxsize=4)(self._folded)
 
     def rest(self, factor: float) -> NDArray:
@@ -116,7 +120,8 @@ class Actuation:
         return np.where(possible, angle, np.nan)
 
     def _folded(self, factor: float) -> Assembly:
-        return self._body.folded(self.rest(factor)) if self.acts else self._body
+        body = self._body.at(lambda history: factor)
+        return body.folded(self.rest(factor)) if self._turns else body
 
 
 class OrigamiProblem(Problem):
@@ -171,6 +176,7 @@ class OrigamiProblem(Problem):
         flow: str = REFUSED, memory: NDArray | str | None = None, timed: bool = False,
     ) -> None:  # fmt: skip
         refuse_wind(case, "statics")
+        refuse_varying(case.supports)
         if inertia_relief:
             refuse_air(case, "inertia relief")
             if case.structure.linear:
@@ -366,6 +372,13 @@ class OrigamiProblem(Problem):
         self._evaluate(u, 0.0)
         return self.memories.slips()
 
+    def opens(self, u: NDArray, factor: float) -> bool:
+        """Whether a latch opens on the way to a state (m,), so that what it held jumps there."""
+        if not self.memories:
+            return False
+        self._evaluate(u, factor)
+        return self.memories.opens()
+
     def _evaluate(self, u: NDArray, factor: float) -> None:
         self.body(u, factor).energies(self.dofs(u))
 
@@ -373,12 +386,14 @@ class OrigamiProblem(Problem):
         """Largest turn (rad) of a part of the structure from u to v; inf on penetration."""
         return self.actuation.body(0.0).turn(self.dofs(u), self.dofs(v))
 
-    def touch(self, u: NDArray) -> dict[str, NDArray]:
-        """Contact forces (N) in a state (m,), by the names in `results.quantities.CONTACT`."""
+    def touch(self, u: NDArray, factor: float) -> dict[str, NDArray]:
+        """Tensions, and contact forces (N) as in `results.quantities.CONTACT`, in a state (m,)."""
+        q, lines = self.dofs(u), self.case.lines
+        out = {} if lines is None else {"tension": lines.at(lambda _: factor).pulls(q)}
         if self.case.contact is None:
-            return {}
-        q, contact = self.dofs(u), self._contact(u)
-        out = {"contact_force": contact.touch(q)}
+            return out
+        contact = self._contact(u)
+        out["contact_force"] = contact.touch(q)
         if self.case.contact.planes:
             out["plane_force"] = contact.plane_forces(q)
             if self.memories.rubs:
@@ -430,7 +445,8 @@ def _total(terms: Iterable[tuple[NDArray, Any]], shape: tuple[int, ...]) -> NDAr
 def drives(case: Case, constant: Sequence[int]) -> bool:
     """Whether anything in a case grows with the load factor."""
     growing = any(i not in set(constant) for i in range(len(case.loads)))
-    return growing or bool(case.imposed_terms) or bool(case.obstacle_terms)
+    driven = bool(case.elastic_body.histories)
+    return growing or driven or bool(case.imposed_terms) or bool(case.obstacle_terms)
 
 
 def is_actuated(case: Case) -> bool:

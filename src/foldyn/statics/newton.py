@@ -119,6 +119,10 @@ class Problem(Protocol):
         """Whether anything slips in a state (m,); negative eigenvalues then mean nothing."""
         return False
 
+    def opens(self, u: NDArray, factor: float) -> bool:
+        """Whether a latch opens on the way to a state (m,), so that what it held jumps there."""
+        return False
+
     def keep(self, u: NDArray, factor: float) -> Any:
         """Accept a state (m,) and return what has yielded and slipped, for `recall`."""
 

@@ -14,6 +14,8 @@ from numpy.typing import NDArray
 from foldyn.cases import Case
 from foldyn.errors import InputError
 from foldyn.materials.inelastic_law import VARIABLES
+from foldyn.materials.latching import CODE as LATCH
+from foldyn.materials.latching import Latching
 from foldyn.structures.inelastic_hinges import Remembering
 from foldyn.structures.inelastic_hinges import memory as memory_of
 
@@ -83,6 +85,13 @@ class Memories:
     def slips(self) -> bool:
         """Whether anything slips in the state in which the body was last evaluated."""
         return self._friction is not None and self._friction.slips()
+
+    def opens(self) -> bool:
+        """Whether a latch has opened in the state in which the body was last evaluated."""
+        if self._creases is None:
+            return False
+        own = self._creases.own
+        return bool(((own.code == LATCH) & (own.state[:, 0] > own.reached[:, 0])).any())
 
     def elapse(self, seconds: float) -> None:
         """Set the time (s) from the last accepted step to the next evaluation."""
@@ -160,6 +169,12 @@ def _flows(case: Case, flow: str, timed: bool) -> tuple[Remembering, ...]:
     parts = tuple(part for part in case.remembering if timed or not part.law.relaxes)
     for part in parts:
         name, field = part.law.name, f"{part.kind}_law"
+        if isinstance(part.law, Latching) and flow == REFUSED:
+            raise InputError(
+                ": latches make equilibria depend on the path, and only fd.simulate and fd.trace "
+                "follow them; elsewhere leave them out",
+                "supports",
+            )
         if timed or flow == AT_REST or (flow == FOLLOWED and not part.law.rate_dependent):
             continue
         if part.law.rate_dependent:

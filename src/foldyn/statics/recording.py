@@ -241,6 +241,9 @@ def _dataset(
         warn(message, "models.md#where-panels-stretch", StretchWarning)
     if message := _turn_warning(problem, points, displacement):
         warn(message, "superelements.md#what-it-takes", ModelRangeWarning)
+    if "tension" in touches[0]:
+        tension = np.array([touch["tension"] for touch in touches])
+        problem.case.pressed(tension, lambda at: f"the load factor {points[at].factor:.6g}")
     intervals = {}
     if any(point.interval for point in points):  # some critical points could not be located
         intervals["interval"] = [p.interval or (p.factor, p.factor) for p in points]
@@ -317,7 +320,7 @@ def _recorded(
         problem.residual(*at),
         problem.energies(*at),
         problem.reactions(*at),
-        problem.touch(point.u),
+        problem.touch(*at),
     )
 
 

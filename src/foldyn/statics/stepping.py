@@ -138,7 +138,7 @@ def _step(solver: Solver, start: Station, factor: float, seconds: float, search:
         reach = solver.settings.jump * float(np.linalg.norm(predicted))
         return length > reach + NEGLIGIBLE * problem.length
 
-    if not snaps(start.stiffness, start.response):
+    if not snaps(start.stiffness, start.response) or problem.opens(attempt.u, factor):
         return attempt
     if start.point.memory is not None:
         # parts may yield or slip within the step: compare with the tangent at its end

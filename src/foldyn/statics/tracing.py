@@ -301,6 +301,7 @@ def _check_case(case: Case, plan: PathPlan, constant: Sequence[int], adaptive: b
     """Refuse a case in which nothing changes along the path."""
     case.check_movable()
     moves = bool(case.imposed_terms) or is_actuated(case) or bool(case.obstacle_terms)
+    moves = moves or bool(case.elastic_body.histories)
     if plan.method.name == "displacement" and not moves:
         raise InputError(
             " 'displacement' needs something that moves: an Impose among the supports, an Actuate "
@@ -312,9 +313,9 @@ def _check_case(case: Case, plan: PathPlan, constant: Sequence[int], adaptive: b
         return  # one point, under constant loads
     if not (drives(case, constant) or adaptive):
         raise InputError(
-            "nothing grows along the path: give a Force, Gravity, Actuate, Impose or moving plane "
-            "that is not among the constant loads (load_factors = [0] finds the state under these "
-            "alone)"
+            "nothing grows along the path: give a Force, Gravity, Actuate, Impose, moving plane, "
+            "or a cable or spring with a history, that is not among the constant loads "
+            "(load_factors = [0] finds the state under these alone)"
         )
 
 

@@ -140,8 +140,8 @@ def check_stresses(case: Case, field: str) -> None:
         raise InputError(": the structure has no pattern, and so no panels", field)
     if case.remembering:
         raise InputError(
-            ": the creases have a law with memory, which stresses do not follow: take an elastic "
-            "law",
+            ": the creases have a law with memory or latches, which stresses do not follow: take "
+            "an elastic law, and no latches",
             field,
         )
     if isinstance(case.structure, Structure) and has_stresses(case.structure):

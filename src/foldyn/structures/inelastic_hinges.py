@@ -24,12 +24,14 @@ class Remembering(NamedTuple):
     """Hinges of one kind whose law has memory.
 
     damping : damping (k,) of the creases, N m s/rad, if adjacent panels are compliant.
+    rows : (k,) rows of these hinges among all of the kind; None for all.
     """
 
     kind: str  # "fold" or "bend"
     law: MemoryLaw
     hinges: FoldHinges
     damping: NDArray
+    rows: NDArray | None = None
 
     @property
     def count(self) -> int:

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.cases import Case
+from foldyn.cases import Case, Latch, Stop
+from foldyn.cases.selection import resolve_creases
 from foldyn.patterns import Pattern
 from foldyn.patterns.topology import Lines
 from foldyn.structures.discretized import Discretized
@@ -23,11 +24,13 @@ def sheet(arrays: Arrays, key: str, case: Case) -> dict[str, Any]:
 
     "nodes" (n, 3), m; "triangles" (t, 3) and the "panel" of each; "edges" (k, 2), pieces of the
     pattern's edges, with their "kind", their "crease", and "along" (k, 2), the positions of their
-    ends along that crease, m; "bars" (b, 2) of bars and hinges; "held" and "loads", see below.
+    ends along that crease, m; "bars" (b, 2) of bars and hinges; "held", "loads", "lines" and
+    "catches", see below.
     """
     structure = case.structure
     out = _surface(arrays, key, structure.pattern, structure, structure.edge_nodes)
-    out |= {"held": held(case), "loads": load_arrows(case)}
+    out |= {"held": held(case), "loads": load_arrows(case), "lines": lines(case)}
+    out["catches"] = catches(case)
     if structure.bar_law is not None:
         out["bars"] = arrays.exact(f"{key}.bars", structure.bars, "u4")
     return out
@@ -35,7 +38,8 @@ def sheet(arrays: Arrays, key: str, case: Case) -> dict[str, Any]:
 
 def bare_sheet(arrays: Arrays, key: str, pattern: Pattern) -> dict[str, Any]:
     """Describe a pattern, whose nodes are its vertices, in the same way."""
-    return _surface(arrays, key, pattern, n4b5(pattern), pattern.lines) | {"held": [], "loads": []}
+    bare = {"held": [], "loads": [], "lines": [], "catches": []}
+    return _surface(arrays, key, pattern, n4b5(pattern), pattern.lines) | bare
 
 
 def _surface(
@@ -81,6 +85,23 @@ def held(case: Case) -> list[list[Any]]:
     fixed = np.asarray(case.fixed).reshape(-1, 3)
     axes = np.array(["x", "y", "z"])
     return [[int(node), "".join(axes[fixed[node]])] for node in np.flatnonzero(fixed.any(axis=1))]
+
+
+def lines(case: Case) -> list[list[Any]]:
+    """Springs between nodes, bars and cables, by nodes and points that stand still, m."""
+    return [
+        [int(one) if one >= 0 else point.tolist() for one, point in zip(node, x, strict=True)]
+        for _, node, x in case.polylines()
+    ]
+
+
+def catches(case: Case) -> list[list[int]]:
+    """Vertices at the ends of creases with end stops or latches."""
+    some = (one for one in case.supports if isinstance(one, Stop | Latch))
+    chosen = [resolve_creases(case.structure, one.creases) for one in some]
+    return (
+        case.structure.pattern.creases[np.unique(np.concatenate(chosen))].tolist() if chosen else []
+    )
 
 
 def load_arrows(case: Case) -> list[list[Any]]:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
+from foldyn.cases.springs import Made
 from foldyn.dynamics.gpu.checks import MOST_KINDS
 from foldyn.dynamics.gpu.elements import Counts, Damping, Elements
 from foldyn.dynamics.gpu.kernels import Nodes
@@ -21,10 +22,7 @@ from foldyn.mechanics.springs import Springs, SpringsTerm
 from foldyn.mechanics.viscous import Viscous, ViscousTerm, viscous
 
 TOPOLOGY = ("bars", "bar_runs", "hinges", "hinge_runs", "hinge_group", "addresses")
-NO_SPRINGS = Springs(
-    np.zeros((0, 2), np.int64), np.zeros((0, 3)), np.zeros(0), np.zeros((0, 2), np.int64),
-    np.zeros((0, 3)), *np.zeros((3, 0)),
-)  # fmt: skip
+NO_SPRINGS = Made().springs()
 NONE = np.zeros(0, np.int64)
 NO_DAMPERS = viscous(
     *(NONE.reshape(shape) for shape in ((0, 2), (0, 3), 0, (0, 4), (0, 4, 3), (0, 2), (0, 2), 0))
@@ -108,11 +106,17 @@ class CaseArrays:
 
     def _springs(self, own: Sequence[Springs]) -> Springs:
         own = own or [NO_SPRINGS]
-        for ends, plus in ((own[0].ends, 0), (own[0].axial_ends, 1)):
+        lines = own[0].lines
+        pieces = np.delete(np.arange(len(lines.node)), lines.first[1:] - 1)
+        after = lines.node[np.minimum(pieces + 1, len(lines.node) - 1)]
+        for plus, minus in ((own[0].ends[:, 0], own[0].ends[:, 1]), (after, lines.node[pieces])):
             first = self._slots
-            self._add(ends[:, plus], 1)
-            self._again(ends[:, 1 - plus], 0, first)
-        return _stacked(own, ("ends", "axial_ends"))
+            self._add(plus, 1)
+            self._again(minus, 0, first)
+        same = "first", "node", "slack", "scaled", "row"
+        stacked = _stacked([each.lines for each in own], same)
+        plain = [each._replace(lines=()) for each in own]
+        return _stacked(plain, ("ends", "row", "lines"))._replace(lines=stacked)
 
     def _dampers(self, rows: Sequence[Sequence[Viscous]]) -> Viscous:
         own = list(rows[0]) if rows else [NO_DAMPERS]
@@ -171,7 +175,8 @@ def topology(packed: PackedCase) -> tuple[Any, ...]:
         if isinstance(term, MembranesTerm):
             arrays += term.membranes[:2]
         elif isinstance(term, SpringsTerm):
-            arrays += [term.springs.ends, term.springs.axial_ends]
+            own = term.springs.lines
+            arrays += [term.springs.ends, own.first, own.node, own.slack, own.scaled]
         elif isinstance(term, DampingMatrix):
             arrays += [term.matrix.indptr, term.matrix.indices]
         elif isinstance(term, ViscousTerm):

@@ -94,6 +94,8 @@ def lacking(case: Case, packed: PackedCase) -> str:
     for term in body.others:
         if type(term) not in TERMS:
             return f"the term {type(term).__name__.removesuffix('Term')}"
+        if term.histories:
+            return "a spring or cable that follows a history"
         if isinstance(term, ViscousTerm) and term.elements.hidden_turn.any():
             return "a damper at dofs without mass"
         if isinstance(term, MembranesTerm) and len(term.membranes.ends) > MOST_BARS:

@@ -10,7 +10,8 @@ from typing import Any, NamedTuple
 
 from foldyn.dynamics.gpu.ported import SIMULATED, on_device, ported
 from foldyn.materials import series, switch
-from foldyn.mechanics import energy, springs
+from foldyn.mechanics import energy, lines, springs
+from foldyn.mechanics.lines import Lines
 from foldyn.mechanics.membranes import Membranes
 from foldyn.mechanics.model import BarsHinges
 from foldyn.mechanics.springs import Springs
@@ -20,7 +21,9 @@ bar_extension, hinge_dihedral = ported(energy.bar_extension), ported(energy.hing
 bar_energy, bar_stress = ported(switch.bar_energy), ported(switch.bar_stress)
 series_energy, series_moment = ported(series.series_energy), ported(series.series_moment)
 directed_extension = ported(springs.directed_extension)
-axial_extension, axial_pull = ported(springs.axial_extension), ported(springs.axial_pull)
+piece, extension = ported(lines.piece), ported(lines.extension)
+shift = ported(lines.moved)
+strength, idle, per_length = ported(lines.strength), ported(lines.idle), ported(lines.per_length)
 
 
 class Counts(NamedTuple):
@@ -170,34 +173,41 @@ def hinges_to(own, code, u, slot, size, at_slot, who, crowd, sampled, looks, ang
 @on_device
 def springs_to(all_springs, m, group, u, slot, size, at_slot, who, crowd, sampled, strain):
     """Write spring forces, directed springs only at the first end; return the next free slot."""
+    every = all_springs.lines
     own = Springs(
         all_springs.ends, at(all_springs.direction, m), at(all_springs.stiffness, m),
-        all_springs.axial_ends, at(all_springs.vector, m), at(all_springs.length, m),
-        at(all_springs.stretch, m), at(all_springs.axial_stiffness, m),
+        all_springs.row, at(all_springs.now, m),
+        Lines(
+            every.first, every.node, at(every.vector, m), at(every.length, m),
+            at(every.natural, m), at(every.stretch, m), at(every.stiffness, m), every.slack,
+            every.scaled, at(every.change, m), every.row, at(every.now, m),
+        ),
     )  # fmt: skip
-    directed, axial = own.ends.shape[0], own.axial_ends.shape[0]
+    line, directed, count = own.lines, own.ends.shape[0], own.lines.stiffness.shape[0]
     for s in range(who, directed, crowd):
-        extension = directed_extension(own, u, s)
-        pull = own.stiffness[s] * extension
+        moved = directed_extension(own, u, s)
+        pull = own.stiffness[s] * moved
         put(
             slot, size, at_slot + s, pull * own.direction[s, 0], pull * own.direction[s, 1],
             pull * own.direction[s, 2],
         )  # fmt: skip
         if sampled:
-            strain[group] += 0.5 * pull * extension
-    for s in range(who, axial, crowd):
-        a, b = own.axial_ends[s, 0], own.axial_ends[s, 1]
-        pull = axial_pull(own, u, s)
-        put(
-            slot, size, at_slot + directed + s,
-            pull * (own.vector[s, 0] + u[b, 0] - u[a, 0]),
-            pull * (own.vector[s, 1] + u[b, 1] - u[a, 1]),
-            pull * (own.vector[s, 2] + u[b, 2] - u[a, 2]),
-        )  # fmt: skip
+            strain[group] += 0.5 * pull * moved
+    for s in range(who, count, crowd):
+        beyond, stiff = extension(line, u, s, 0.0), strength(line, s, 0.0)
+        if idle(line, s, beyond):
+            beyond = 0.0
+        for i in range(line.first[s], line.first[s + 1] - 1):
+            pull = per_length(line, s, stiff * beyond, piece(line, u, i)[1])
+            put(
+                slot, size, at_slot + directed + i - s,  # a line has a piece less than points
+                pull * (line.vector[i, 0] + shift(line, u, i + 1, 0) - shift(line, u, i, 0)),
+                pull * (line.vector[i, 1] + shift(line, u, i + 1, 1) - shift(line, u, i, 1)),
+                pull * (line.vector[i, 2] + shift(line, u, i + 1, 2) - shift(line, u, i, 2)),
+            )  # fmt: skip
         if sampled:
-            extension = axial_extension(own, u, s)[0]
-            strain[group] += 0.5 * own.axial_stiffness[s] * extension * extension
-    return at_slot + directed + axial
+            strain[group] += 0.5 * stiff * beyond * beyond
+    return at_slot + directed + line.node.shape[0] - count
 
 
 @on_device

@@ -115,7 +115,7 @@ class Scheme(ABC):
         self.shift = np.zeros(shape)  # new.q - old.q, stored because subtracting would lose digits
         self.earlier = np.zeros(shape)  # new.q before the last iteration
         self._gap, self._pushed = np.zeros(histories[0]), np.zeros(shape)
-        self.air = packed.body.find(AirDragTerm)
+        self.driven = np.flatnonzero([bool(term.histories) for term in packed.body.terms])
         air = [isinstance(term, AirDragTerm) for term in packed.body.terms]
         damps = [term.damps for term in packed.body.terms] & ~np.array(air)
         self.damping, self.drag = np.flatnonzero(damps), np.flatnonzero(air)

@@ -20,7 +20,10 @@ export function annotate(context, page, views, { width, height }, tones) {
     context.rect(view.x, view.y, view.width, view.height);
     context.clip();
     const few = (marks) => page.marks && marks.length * views.length <= MOST_MARKS;
-    const { held, loads } = first.sheet;
+    const { held, loads, lines, catches } = first.sheet;
+    const point = (one) => Array.isArray(one) ? pen.project(...one, [0, 0, 0]) : at(first, one);
+    if (few(catches)) catches.forEach((ends) => diamond(pen, ends.map(point)));
+    if (few(lines)) lines.forEach((line) => polyline(pen, line.map(point)));
     if (few(held)) held.forEach(([node]) => support(pen, at(first, node)));
     if (few(loads)) loads.forEach(([node, force]) => arrow(pen, at(first, node), force));
     if (page.node !== null) {
@@ -39,6 +42,24 @@ export function annotate(context, page, views, { width, height }, tones) {
   if (views[0].width >= ROOMY) triad(pen, 40, 46, 24);
   else triad(pen, 30, height - 24, 15);
   ruler(pen, views[0], width - 16, height - 14);
+}
+
+// An end stop or a latch, at the middle of its crease.
+function diamond({ context, tones, size }, [[x0, y0], [x1, y1]]) {
+  const [x, y, r] = [0.5 * (x0 + x1), 0.5 * (y0 + y1), 5.5 * size];
+  context.beginPath();
+  [[r, 0], [0, r], [-r, 0], [0, -r]].forEach(([dx, dy], k) =>
+    k ? context.lineTo(x + dx, y + dy) : context.moveTo(x + dx, y + dy));
+  context.closePath();
+  context.fillStyle = tones.support;
+  context.fill();
+}
+
+// Springs between nodes, bars and cables.
+function polyline(pen, points) {
+  pen.context.beginPath();
+  points.forEach(([x, y], k) => k ? pen.context.lineTo(x, y) : pen.context.moveTo(x, y));
+  cased(pen, pen.tones.support, 1.5);
 }
 
 function support({ context, tones, size }, [x, y]) {

@@ -1,0 +1,324 @@
+"""Elastic lines over points: springs between two nodes, struts, and cables over several nodes.
+
+A line runs straight from point to point, nodes or points on the ground, and slides over those in
+between without friction: all its pieces have the tension k (l - l0), with l the sum of their
+lengths. A cable is slack, without force, where l is below l0.
+
+The force-free length l0 and the stiffness k may change in time: l0 by `change` times the factor of
+a history, as by a winch, and k as the factor of another. Of lines that are given by EA, k = EA/l0
+changes with l0. What these changes add to the energy at given positions is the power of the motor.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from foldyn.jit.compiled import inner, inner_scalar, kernel
+
+GROUND = -1  # stands for an end on the ground
+SOON = 1e-3
+JUST_TAUT = 1e-12  # share of its length by which a cable may be too long and still count as taut
+
+
+class Lines(NamedTuple):
+    """Arrays of c lines with p points in all."""
+
+    first: NDArray  # (c + 1,) first point of each line
+    node: NDArray  # (p,) node of each point; `GROUND` for those that stand still
+    vector: NDArray  # (p, 3) to the next point of the line at rest, m
+    length: NDArray  # (p,) length of `vector`, m
+    natural: NDArray  # (c,) l0 at rest, m
+    stretch: NDArray  # (c,) length at rest in excess of l0, m
+    stiffness: NDArray  # (c,) N/m, with l0 at rest
+    slack: NDArray  # (c,) whether it has no force if l is below l0
+    scaled: NDArray  # (c,) whether k l0 is constant
+    change: NDArray  # (c,) of l0 at the factor 1, m
+    row: NDArray  # (c, 2) rows of the histories of l0 and k, -1 for none
+    now: NDArray  # (c, 4) current change of l0 (m) and its rate, factor of k and its rate
+
+
+@inner_scalar
+def moved(lines, u, i, c):
+    """Displacement of a point, m."""
+    node = lines.node[i]
+    return 0.0 if node < 0 else u[node, c]
+
+
+@inner_scalar
+def piece(lines, u, i):
+    """Growth of the piece after point i, and its length, m; from displacements."""
+    length, x = lines.length[i], 0.0
+    for c in range(3):
+        du = moved(lines, u, i + 1, c) - moved(lines, u, i, c)
+        x += du * (2.0 * lines.vector[i, c] + du)
+    now = math.sqrt(max(length * length + x, 0.0))
+    return (x / (now + length) if now + length > 0.0 else 0.0), now
+
+
+@inner_scalar
+def extension(lines, u, s, ahead):
+    """l - l0 of a line, m; with l0 as it is `ahead` (s) later."""
+    total = lines.stretch[s] - lines.now[s, 0] - ahead * lines.now[s, 1]
+    for i in range(lines.first[s], lines.first[s + 1] - 1):
+        total += piece(lines, u, i)[0]
+    return total
+
+
+@inner_scalar
+def strength(lines, s, ahead):
+    """k of a line (N/m), as it is `ahead` (s) later; nan if no length is left of a scaled one."""
+    k = lines.stiffness[s] * (lines.now[s, 2] + ahead * lines.now[s, 3])
+    if lines.scaled[s]:
+        left = lines.natural[s] + lines.now[s, 0] + ahead * lines.now[s, 1]
+        k = k * lines.natural[s] / left if left > 0.0 else math.nan
+    return k
+
+
+@inner_scalar
+def idle(lines, s, beyond):
+    """Whether a line is slack at the extension `beyond`, m."""
+    return lines.slack[s] and beyond < 0.0
+
+
+@inner_scalar
+def free(lines, s):
+    """Whether a line pulls with k times its length, whatever the direction: its ends may meet."""
+    return lines.natural[s] == 0.0 and lines.row[s, 0] < 0
+
+
+@inner_scalar
+def per_length(lines, s, tension, length):
+    """Ratio (N/m) of the tension of a line to the length of a piece."""
+    if free(lines, s):
+        return strength(lines, s, 0.0)
+    return tension / length if length > 0.0 else 0.0
+
+
+@inner_scalar
+def _add_pull(lines, i, pull, start, end, force):
+    """Add the forces of a piece, `pull` (N/m) times the mean of its vectors at two states."""
+    a, b = lines.node[i], lines.node[i + 1]
+    for c in range(3):
+        apart = moved(lines, start, i + 1, c) - moved(lines, start, i, c)
+        apart += moved(lines, end, i + 1, c) - moved(lines, end, i, c)
+        along = pull * (lines.vector[i, c] + 0.5 * apart)
+        if b >= 0:
+            force[b, c] += along
+        if a >= 0:
+            force[a, c] -= along
+
+
+@inner
+def pull_lines(lines, u, force):
+    """Add the forces of all lines; return the power of the motors, W."""
+    power = 0.0
+    for s in range(lines.stiffness.size):
+        beyond = extension(lines, u, s, 0.0)
+        if idle(lines, s, beyond):
+            continue
+        k = strength(lines, s, 0.0)
+        for i in range(lines.first[s], lines.first[s + 1] - 1):
+            pull = per_length(lines, s, k * beyond, piece(lines, u, i)[1])
+            _add_pull(lines, i, pull, u, u, force)
+        if lines.row[s, 0] >= 0 or lines.row[s, 1] >= 0:
+            power += 0.5 * beyond * beyond * _rate_of_strength(lines, s, k)
+            power -= k * beyond * lines.now[s, 1]
+    return power
+
+
+@inner_scalar
+def _rate_of_strength(lines, s, k):
+    rate = lines.stiffness[s] * lines.now[s, 3]
+    if lines.scaled[s]:
+        left = lines.natural[s] + lines.now[s, 0]
+        rate = (rate * lines.natural[s] - k * lines.now[s, 1]) / left
+    return rate
+
+
+@kernel
+def put_tensions(lines, u, out):
+    """Put the tensions (c,) of all lines, N, to `out`; those of slack ones as if they pushed."""
+    for s in range(lines.stiffness.size):
+        out[s] = strength(lines, s, 0.0) * extension(lines, u, s, 0.0)
+
+
+@inner
+def lines_energy(lines, u):
+    """Energy of all lines, J."""
+    energy = 0.0
+    for s in range(lines.stiffness.size):
+        energy += strength(lines, s, 0.0) * _half_square(lines, u, s, 0.0)[1]
+    return energy
+
+
+@inner_scalar
+def _half_square(lines, u, s, ahead):
+    """Extension of a line, and the energy per stiffness."""
+    beyond = extension(lines, u, s, ahead)
+    return beyond, 0.0 if idle(lines, s, beyond) else 0.5 * beyond * beyond
+
+
+@inner
+def pull_on_average(lines, u0, u1, h, force):
+    """Add forces whose work from u0 to u1 in a step h (s) is the change of the energies.
+
+    The lines are as in the middle of the step. Returns the power of the motors, W.
+    """
+    power = 0.0
+    for s in range(lines.stiffness.size):
+        first, before = _half_square(lines, u0, s, -0.5 * h)
+        last, after = _half_square(lines, u1, s, 0.5 * h)
+        if before == 0.0 and after == 0.0:
+            continue
+        soft, stiff = strength(lines, s, -0.5 * h), strength(lines, s, 0.5 * h)
+        mean = 0.5 * (first + last)
+        if lines.slack[s] and (first < 0.0 or last < 0.0):
+            mean = (after - before) / (last - first)
+        tension = 0.5 * (soft + stiff) * mean
+        for i in range(lines.first[s], lines.first[s + 1] - 1):
+            both = 0.5 * (piece(lines, u0, i)[1] + piece(lines, u1, i)[1])
+            _add_pull(lines, i, per_length(lines, s, tension, both), u0, u1, force)
+        power += 0.5 * (before + after) * (stiff - soft) / h - tension * lines.now[s, 1]
+    return power
+
+
+@kernel
+def line_rates(lines, u, s, out):
+    """Put the derivatives (p, 3) of a line's length by the positions of its points to `out`."""
+    out[:] = 0.0
+    for j in range(lines.first[s + 1] - lines.first[s] - 1):
+        i = lines.first[s] + j
+        length = piece(lines, u, i)[1]
+        for c in range(3):
+            along = lines.vector[i, c] + moved(lines, u, i + 1, c) - moved(lines, u, i, c)
+            along = along / length if length > 0.0 else 0.0
+            out[j + 1, c] += along
+            out[j, c] -= along
+
+
+@kernel
+def line_blocks(lines, u, loose, out):
+    """Put the derivatives of the forces of all lines, N/m, by all their points, line by line.
+
+    loose : without the part of the tension of lines that push.
+    """
+    at, most = 0, 0
+    for s in range(lines.stiffness.size):
+        most = max(most, lines.first[s + 1] - lines.first[s])
+    room = np.empty((most, 3))
+    for s in range(lines.stiffness.size):
+        points = lines.first[s + 1] - lines.first[s]
+        size = 3 * points
+        block = out[at : at + size * size].reshape(size, size)
+        block[:] = 0.0
+        at += size * size
+        beyond, k = extension(lines, u, s, 0.0), strength(lines, s, 0.0)
+        if lines.slack[s] and beyond < -JUST_TAUT * (lines.natural[s] + lines.now[s, 0]):
+            continue
+        rates = room[:points]
+        line_rates(lines, u, s, rates)
+        for a in range(size):
+            for b in range(size):
+                block[a, b] = k * rates[a // 3, a % 3] * rates[b // 3, b % 3]
+        for j in range(0 if loose and beyond < 0.0 else points - 1):
+            i = lines.first[s] + j
+            length = piece(lines, u, i)[1]
+            pull = per_length(lines, s, k * beyond, length)
+            for a in range(3):
+                x = lines.vector[i, a] + moved(lines, u, i + 1, a) - moved(lines, u, i, a)
+                for b in range(3):
+                    y = lines.vector[i, b] + moved(lines, u, i + 1, b) - moved(lines, u, i, b)
+                    across = pull * ((a == b) - (x * y / length**2 if length > 0.0 else 0.0))
+                    block[3 * j + a, 3 * j + b] += across
+                    block[3 * j + 3 + a, 3 * j + 3 + b] += across
+                    block[3 * j + a, 3 * j + 3 + b] -= across
+                    block[3 * j + 3 + a, 3 * j + b] -= across
+
+
+@inner
+def differentiate_lines(lines, out, u, weights, added):
+    """Add the derivatives of weights . F by displacements to `added`, by arrays to `out`."""
+    for s in range(lines.stiffness.size):
+        beyond = extension(lines, u, s, 0.0)
+        if idle(lines, s, beyond):
+            continue
+        k, growth = strength(lines, s, 0.0), 0.0  # growth: rate of l for velocities `weights`
+        for i in range(lines.first[s], lines.first[s + 1] - 1):
+            growth += _growth(lines, u, weights, i)[0]
+        out.stretch[s] += k * growth
+        out.stiffness[s] += beyond * growth
+        for i in range(lines.first[s], lines.first[s + 1] - 1):
+            own, length = _growth(lines, u, weights, i)
+            pull = per_length(lines, s, k * beyond, length)
+            by_length = 0.0  # derivative by the length of the piece
+            if length > 0.0:
+                by_length = 0.0 if free(lines, s) else k * growth - pull * own
+                out.length[i] += by_length * lines.length[i] / length - k * growth
+                by_length /= length
+            for c in range(3):
+                du = moved(lines, u, i + 1, c) - moved(lines, u, i, c)
+                by = pull * (moved(lines, weights, i + 1, c) - moved(lines, weights, i, c))
+                out.vector[i, c] += by + by_length * du
+                by += by_length * (lines.vector[i, c] + du)
+                a, b = lines.node[i], lines.node[i + 1]
+                if b >= 0:
+                    added[b, c] += by
+                if a >= 0:
+                    added[a, c] -= by
+
+
+@inner_scalar
+def _growth(lines, u, weights, i):
+    """Rate of a piece's length for velocities `weights`, and that length."""
+    length, grown = piece(lines, u, i)[1], 0.0
+    for c in range(3):
+        x = lines.vector[i, c] + moved(lines, u, i + 1, c) - moved(lines, u, i, c)
+        grown += (moved(lines, weights, i + 1, c) - moved(lines, weights, i, c)) * x
+    return (grown / length if length > 0.0 else 0.0), length
+
+
+@inner
+def until_turn(lines, u, v, a, h):
+    """Time (s), at most h, until a cable goes slack or taut; u, v and a are (n, 3).
+
+    Times below `SOON` times h do not count: so little of a step does no harm.
+    """
+    for s in range(lines.stiffness.size):
+        if not lines.slack[s]:
+            continue
+        beyond, rate, growth = extension(lines, u, s, 0.0), -lines.now[s, 1], 0.0
+        for i in range(lines.first[s], lines.first[s + 1] - 1):
+            length, squares, along = piece(lines, u, i)[1], 0.0, 0.0
+            for c in range(3):
+                x = lines.vector[i, c] + moved(lines, u, i + 1, c) - moved(lines, u, i, c)
+                speed = moved(lines, v, i + 1, c) - moved(lines, v, i, c)
+                squares += speed**2 + x * (moved(lines, a, i + 1, c) - moved(lines, a, i, c))
+                along += x * speed
+            if length > 0.0:
+                rate += along / length
+                growth += (squares - (along / length) ** 2) / length
+        root = rate * rate - 2.0 * growth * beyond
+        if root < 0.0:
+            continue
+        half = -(
+            rate + math.copysign(math.sqrt(root), rate)
+        )  # of a quadratic, without cancellation
+        for time in (half / growth if growth != 0.0 else 0.0, 2.0 * beyond / half if half else 0.0):
+            if SOON * h < time < h:
+                h = time
+    return h
+
+
+@inner
+def drive_lines(lines, factors):
+    """Set lengths and stiffness for factors (h, 3) of the histories."""
+    for s in range(lines.stiffness.size):
+        for k in range(2):
+            if lines.row[s, 0] >= 0:
+                lines.now[s, k] = lines.change[s] * factors[lines.row[s, 0], k]
+            if lines.row[s, 1] >= 0:
+                lines.now[s, 2 + k] = factors[lines.row[s, 1], k]
