@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from foldyn.jit.compiled import inner, inner_scalar, kernel
 
 GROUND = -1  # stands for an end on the ground
-SOON = 1e-3
+SOON = 1e-3  # share of a step below which a change from slack to taut does no harm
 JUST_TAUT = 1e-12  # share of its length by which a cable may be too long and still count as taut
 
 
@@ -49,11 +49,23 @@ def moved(lines, u, i, c):
 
 
 @inner_scalar
+def between(lines, u, i, c):
+    """Difference of the displacements of both ends of the piece after point i, m."""
+    return moved(lines, u, i + 1, c) - moved(lines, u, i, c)
+
+
+@inner_scalar
+def along(lines, u, i, c):
+    """Component of the vector from point i to the next, m."""
+    return lines.vector[i, c] + between(lines, u, i, c)
+
+
+@inner_scalar
 def piece(lines, u, i):
     """Growth of the piece after point i, and its length, m; from displacements."""
     length, x = lines.length[i], 0.0
     for c in range(3):
-        du = moved(lines, u, i + 1, c) - moved(lines, u, i, c)
+        du = between(lines, u, i, c)
         x += du * (2.0 * lines.vector[i, c] + du)
     now = math.sqrt(max(length * length + x, 0.0))
     return (x / (now + length) if now + length > 0.0 else 0.0), now
@@ -103,13 +115,12 @@ def _add_pull(lines, i, pull, start, end, force):
     """Add the forces of a piece, `pull` (N/m) times the mean of its vectors at two states."""
     a, b = lines.node[i], lines.node[i + 1]
     for c in range(3):
-        apart = moved(lines, start, i + 1, c) - moved(lines, start, i, c)
-        apart += moved(lines, end, i + 1, c) - moved(lines, end, i, c)
-        along = pull * (lines.vector[i, c] + 0.5 * apart)
+        apart = between(lines, start, i, c) + between(lines, end, i, c)
+        pulled = pull * (lines.vector[i, c] + 0.5 * apart)
         if b >= 0:
-            force[b, c] += along
+            force[b, c] += pulled
         if a >= 0:
-            force[a, c] -= along
+            force[a, c] -= pulled
 
 
 @inner
@@ -132,6 +143,7 @@ def pull_lines(lines, u, force):
 
 @inner_scalar
 def _rate_of_strength(lines, s, k):
+    """Rate of k, N/(m s)."""
     rate = lines.stiffness[s] * lines.now[s, 3]
     if lines.scaled[s]:
         left = lines.natural[s] + lines.now[s, 0]
@@ -194,10 +206,9 @@ def line_rates(lines, u, s, out):
         i = lines.first[s] + j
         length = piece(lines, u, i)[1]
         for c in range(3):
-            along = lines.vector[i, c] + moved(lines, u, i + 1, c) - moved(lines, u, i, c)
-            along = along / length if length > 0.0 else 0.0
-            out[j + 1, c] += along
-            out[j, c] -= along
+            unit = along(lines, u, i, c) / length if length > 0.0 else 0.0
+            out[j + 1, c] += unit
+            out[j, c] -= unit
 
 
 @kernel
@@ -229,10 +240,9 @@ def line_blocks(lines, u, loose, out):
             length = piece(lines, u, i)[1]
             pull = per_length(lines, s, k * beyond, length)
             for a in range(3):
-                x = lines.vector[i, a] + moved(lines, u, i + 1, a) - moved(lines, u, i, a)
                 for b in range(3):
-                    y = lines.vector[i, b] + moved(lines, u, i + 1, b) - moved(lines, u, i, b)
-                    across = pull * ((a == b) - (x * y / length**2 if length > 0.0 else 0.0))
+                    product = along(lines, u, i, a) * along(lines, u, i, b)
+                    across = pull * ((a == b) - (product / length**2 if length > 0.0 else 0.0))
                     block[3 * j + a, 3 * j + b] += across
                     block[3 * j + 3 + a, 3 * j + 3 + b] += across
                     block[3 * j + a, 3 * j + 3 + b] -= across
@@ -260,10 +270,9 @@ def differentiate_lines(lines, out, u, weights, added):
                 out.length[i] += by_length * lines.length[i] / length - k * growth
                 by_length /= length
             for c in range(3):
-                du = moved(lines, u, i + 1, c) - moved(lines, u, i, c)
-                by = pull * (moved(lines, weights, i + 1, c) - moved(lines, weights, i, c))
-                out.vector[i, c] += by + by_length * du
-                by += by_length * (lines.vector[i, c] + du)
+                by = pull * between(lines, weights, i, c)
+                out.vector[i, c] += by + by_length * between(lines, u, i, c)
+                by += by_length * along(lines, u, i, c)
                 a, b = lines.node[i], lines.node[i + 1]
                 if b >= 0:
                     added[b, c] += by
@@ -276,8 +285,7 @@ def _growth(lines, u, weights, i):
     """Rate of a piece's length for velocities `weights`, and that length."""
     length, grown = piece(lines, u, i)[1], 0.0
     for c in range(3):
-        x = lines.vector[i, c] + moved(lines, u, i + 1, c) - moved(lines, u, i, c)
-        grown += (moved(lines, weights, i + 1, c) - moved(lines, weights, i, c)) * x
+        grown += between(lines, weights, i, c) * along(lines, u, i, c)
     return (grown / length if length > 0.0 else 0.0), length
 
 
@@ -292,21 +300,17 @@ def until_turn(lines, u, v, a, h):
             continue
         beyond, rate, growth = extension(lines, u, s, 0.0), -lines.now[s, 1], 0.0
         for i in range(lines.first[s], lines.first[s + 1] - 1):
-            length, squares, along = piece(lines, u, i)[1], 0.0, 0.0
+            grown, length = _growth(lines, u, v, i)
+            rate += grown
+            squares = -grown * grown
             for c in range(3):
-                x = lines.vector[i, c] + moved(lines, u, i + 1, c) - moved(lines, u, i, c)
-                speed = moved(lines, v, i + 1, c) - moved(lines, v, i, c)
-                squares += speed**2 + x * (moved(lines, a, i + 1, c) - moved(lines, a, i, c))
-                along += x * speed
-            if length > 0.0:
-                rate += along / length
-                growth += (squares - (along / length) ** 2) / length
+                squares += between(lines, v, i, c) ** 2
+                squares += along(lines, u, i, c) * between(lines, a, i, c)
+            growth += squares / length if length > 0.0 else 0.0
         root = rate * rate - 2.0 * growth * beyond
         if root < 0.0:
             continue
-        half = -(
-            rate + math.copysign(math.sqrt(root), rate)
-        )  # of a quadratic, without cancellation
+        half = -rate - math.copysign(math.sqrt(root), rate)  # without cancellation
         for time in (half / growth if growth != 0.0 else 0.0, 2.0 * beyond / half if half else 0.0):
             if SOON * h < time < h:
                 h = time

@@ -22,7 +22,7 @@ bar_energy, bar_stress = ported(switch.bar_energy), ported(switch.bar_stress)
 series_energy, series_moment = ported(series.series_energy), ported(series.series_moment)
 directed_extension = ported(springs.directed_extension)
 piece, extension = ported(lines.piece), ported(lines.extension)
-shift = ported(lines.moved)
+along = ported(lines.along)
 strength, idle, per_length = ported(lines.strength), ported(lines.idle), ported(lines.per_length)
 
 
@@ -201,9 +201,9 @@ def springs_to(all_springs, m, group, u, slot, size, at_slot, who, crowd, sample
             pull = per_length(line, s, stiff * beyond, piece(line, u, i)[1])
             put(
                 slot, size, at_slot + directed + i - s,  # a line has a piece less than points
-                pull * (line.vector[i, 0] + shift(line, u, i + 1, 0) - shift(line, u, i, 0)),
-                pull * (line.vector[i, 1] + shift(line, u, i + 1, 1) - shift(line, u, i, 1)),
-                pull * (line.vector[i, 2] + shift(line, u, i + 1, 2) - shift(line, u, i, 2)),
+                pull * along(line, u, i, 0),
+                pull * along(line, u, i, 1),
+                pull * along(line, u, i, 2),
             )  # fmt: skip
         if sampled:
             strain[group] += 0.5 * stiff * beyond * beyond
