@@ -89,7 +89,8 @@ def trajectory_dataset(
         along, numbers, text = variable(("continued",), one.values, "", told)
         data[name] = along, numbers, text | {"method": one.method, "time": at}
     data |= {} if origin is None else origin_variables(origin[1], origin[0])
-    histories = (getattr(part, "history", None) for part in (*case.supports, *case.loads, case.air))
+    parts = (*case.supports, *case.loads, case.air)
+    histories = [*(getattr(part, "history", None) for part in parts), *case.elastic_body.histories]
     called = any(type(one) not in HISTORIES.values() for one in histories if one is not None)
     times = stage_times(statistics) if called else None
     along = {"time": ("time", time, {"units": "s", "long_name": "time"})}
