@@ -69,7 +69,7 @@ def driven_frequency(case: Case, name: str) -> float:
 
 def check_harmonic(case: Case, name: str) -> None:
     """Refuse histories that are neither harmonic nor constant, and stiffness that varies."""
-    refuse_varying(case.supports)
+    refuse_varying(case)
     for place, part in _parts(case):
         history = as_history(getattr(part, "history", None))
         if not isinstance(history, Constant | Harmonic):

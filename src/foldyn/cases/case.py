@@ -299,8 +299,8 @@ class Case(Loaded, Damped):
 
     def pressed(self, tension: NDArray, named: Callable[[int], str]) -> None:
         """Warn of bars beyond their buckling load, given tensions (k, c) in k states."""
-        limits = np.inf if self.lines is None else self.lines.limits
-        share = -np.asarray(tension) / limits
+        assert self.lines is not None  # or there would be no tension
+        share = -np.asarray(tension) / self.lines.limits
         if share.size and share.max() > 1.0:
             at, line = np.unravel_index(share.argmax(), share.shape)
             warn(

@@ -286,8 +286,8 @@ class _Writer:
 
     def _part(self, part: Any) -> dict[str, Any]:
         section = part.table()
-        for name in ("history", "stiffness_history"):
-            history = getattr(part, name, STEADY)
+        for name in filter(lambda key: key.endswith("history"), part.by_key()):
+            history = getattr(part, name)
             if history != STEADY or name in part.missing:
                 moves = not isinstance(part, Load) or part.moves
                 section[name] = self._history(history, moves)

@@ -69,12 +69,10 @@ class Latch(Part):
                 f"{place}: superelements are linear, and latches are not; take bars and hinges or "
                 "a shell"
             )
-        folds = structure.body.sheet.fold_hinges()
-        on = on_hinges(self, structure, folds, place)
-        hinges = folds.some(on.row)._replace(stiffness=on.stiffness, softness=0.0 * on.stiffness)
-        limit = np.full(len(on.row), np.inf)
-        if self.release is not None:
-            limit = self.release * hinges.length / on.moment
+        on = on_hinges(self, structure, place)
+        folds = structure.body.sheet.fold_hinges().some(on.row)
+        hinges = folds._replace(stiffness=on.stiffness, softness=0.0 * on.stiffness)
+        limit = (np.inf if self.release is None else self.release) / (self.stiffness * on.share)
         law = Latching(
             tuple((on.angle - hinges.rest).tolist()), tuple((on.side * on.stiffness).tolist()),
             tuple(limit.tolist()), np.inf if self.until is None else self.until,

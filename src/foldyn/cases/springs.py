@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Any
 
@@ -53,12 +53,11 @@ class Made:
     def __init__(self, structure: Discretized | None = None) -> None:
         self.structure: Any = structure
         self.histories: list[History] = []
+        self.points: list[tuple[NDArray, NDArray]] = []  # nodes (k,) and positions (k, 3), m
         self.limits: list[float] = []  # N, of each line, beyond which it buckles
         self._directed: list[tuple[Any, ...]] = []  # ends, direction, stiffness, row
-        self._lines: list[tuple[Any, ...]] = []  # l0, stretch, stiffness, slack, scaled, change
+        self._lines: list[tuple[Any, ...]] = []  # l0, stretch, k, slack, scaled, change
         self._row: list[tuple[int, int]] = []
-        self.points: list[tuple[NDArray, NDArray]] = []  # nodes (k,) and positions (k, 3), m
-        self._vector: list[NDArray] = []
 
     def number(self, history: Any) -> int:
         """Row of a history that varies; -1 for a constant one."""
@@ -77,23 +76,26 @@ class Made:
         change: float = 0.0, rows: tuple[int, int] = (-1, -1), slack: bool = False,
         scaled: bool = False, limit: float = math.inf,
     ) -> None:  # fmt: skip
-        """Add a line over points x (k, 3), which are nodes or `GROUND`."""
-        self.limits.append(limit)
-        apart = np.append(np.diff(x, axis=0), np.zeros((1, 3)), axis=0)
-        whole = math.fsum(np.linalg.norm(apart, axis=1).tolist())
+        """Add a line over points x (k, 3), which are nodes or `GROUND`.
+
+        stiffness : k (N/m), or EA (N) if `scaled`.
+        """
+        whole = math.fsum(np.linalg.norm(np.diff(x, axis=0), axis=1).tolist())
         own = whole if natural is None else natural
         if rows[0] < 0:  # changed from the start
             own, change = own + change, 0.0
+        k = stiffness / own if scaled else stiffness
         self.points.append((node, x))
-        self._vector.append(apart)
-        self._lines.append((own, whole - own, stiffness, slack, scaled, change))
+        self.limits.append(limit)
+        self._lines.append((own, whole - own, k, slack, scaled, change))
         self._row.append(rows)
 
     def springs(self) -> Springs:
         """All that was added, as arrays."""
         ends, direction, stiffness, row = _columns(self._directed, 4)
-        none, node = np.zeros((0, 3)), [own for own, _ in self.points]
-        along = np.concatenate([none, *self._vector])
+        node, end = [own for own, _ in self.points], np.zeros((1, 3))
+        vectors = [row for _, x in self.points for row in (np.diff(x, axis=0), end)]
+        along = np.concatenate([end[:0], *vectors])
         natural, stretch, k, slack, scaled, change = _columns(self._lines, 6)
         lines = Lines(
             np.cumsum([0, *map(len, node)]).astype(np.int64),
@@ -234,7 +236,7 @@ class Bar(Elastic):
             _refuse_coincident(structure, x, list(map(int, pair)), f"{place}.between[{k}]")
             own = self.rest_length or length
             limit = math.pi**2 * self.bending / length**2 if self.bending else math.inf
-            made.add_line(pair, x, self.stiffness / own, own, limit=limit)
+            made.add_line(pair, x, self.stiffness, own, scaled=True, limit=limit)
 
 
 def _refuse_coincident(
@@ -330,23 +332,19 @@ class Cable(Elastic):
         own = line / (1.0 + (self.pretension or 0.0) / self.stiffness)
         own = self.rest_length or own
         row = made.number(self.history) if self.change else -1
-        steady = 0.0 if row >= 0 else self.change
-        if own + steady <= 0.0:
+        if row < 0 and own + self.change <= 0.0:
             raise InputError(
                 f" = {self.change:g}: leaves no cable of {own:.6g} m; give a smaller change",
                 f"{place}.change",
             )
-        if own + steady > SLACK * line and not self.change:
+        if own > SLACK * line and not self.change:
             warn(
                 f"{place}: the cable is {own:.6g} m long and its line at rest {line:.6g} m: it is "
                 "slack until its points are farther apart",
                 "supports.md#cables",
                 FoldynWarning,
             )
-        # k = EA/l0 of the length that the line has without the change
-        made.add_line(
-            node, x, self.stiffness / (own + steady), own, self.change, (row, -1), True, True
-        )
+        made.add_line(node, x, self.stiffness, own, self.change, (row, -1), True, True)
 
     def points(self, structure: Discretized, place: str) -> tuple[NDArray, NDArray]:
         """Nodes (k,) of the points, `GROUND` for those that stand still, and positions (k, 3)."""
@@ -359,31 +357,35 @@ class Cable(Elastic):
         return node.astype(np.int64), np.array(fixed, float)
 
 
+def _following(case: Any, *keys: str) -> Iterator[str]:
+    """Fields of springs and cables that follow a history."""
+    for i, support in enumerate(case.supports):
+        for key in keys if isinstance(support, Elastic) else ():
+            if getattr(support, key, STEADY) != STEADY:
+                yield f"supports[{i}].{key}"
+
+
 def refuse_driven(case: Any, name: str) -> None:
     """Refuse springs and cables that follow a history, for an analysis of this name."""
-    for i, support in enumerate(case.supports):
-        for key in ("history", "stiffness_history"):
-            if isinstance(support, Elastic) and getattr(support, key, STEADY) != STEADY:
-                raise InputError(
-                    f": springs and cables that follow a history have no place in {name}; leave "
-                    "the history out, or simulate the motion with bars and hinges or a shell",
-                    f"supports[{i}].{key}",
-                )
+    for field in _following(case, "history", "stiffness_history"):
+        raise InputError(
+            f": springs and cables that follow a history have no place in {name}; leave the "
+            "history out, or simulate the motion with bars and hinges or a shell",
+            field,
+        )
 
 
-def refuse_varying(supports: Sequence[Any]) -> None:
+def refuse_varying(case: Any) -> None:
     """Refuse springs whose stiffness varies in time, where there is no time."""
-    for i, support in enumerate(supports):
-        if getattr(support, "stiffness_history", STEADY) != STEADY:
-            raise InputError(
-                ": only motions have a time in which a stiffness can vary; leave it out",
-                f"supports[{i}].stiffness_history",
-            )
+    for field in _following(case, "stiffness_history"):
+        raise InputError(
+            ": only motions have a time in which a stiffness can vary; leave it out", field
+        )
 
 
-def refuse_cables(supports: Sequence[Any]) -> None:
+def refuse_cables(case: Any) -> None:
     """Refuse cables in cells of an infinite sheet, where they would have no ends."""
-    for i, support in enumerate(supports):
+    for i, support in enumerate(case.supports):
         if isinstance(support, Cable):
             raise InputError(
                 ": cells take springs and bars, but no cables, which would run through all cells; "

@@ -29,7 +29,7 @@ from foldyn.materials.inelastic_law import memory_of
 from foldyn.mechanics.dihedral import add_hessian, dihedrals_and_gradients, gradient_at
 from foldyn.mechanics.discrete_gradient import discrete_gradient, put_motion
 from foldyn.mechanics.model import ranks
-from foldyn.mechanics.sheet_term import NO_DOF, FoldHinges
+from foldyn.mechanics.sheet_term import NO_DOF
 from foldyn.mechanics.term import (
     ENERGIES,
     FORCES,
@@ -306,15 +306,16 @@ class OnHinges(NamedTuple):
     angle: NDArray  # (h,) rad
     side: NDArray  # (h,) 1 if it acts above the angle, -1 below
     stiffness: NDArray  # (h,) N m/rad, by which the hinge becomes stiffer
-    moment: NDArray  # (h,) N m/rad, of the spring itself per turn of the hinge
+    share: NDArray  # (h,) turn of the spring per turn of the hinge
 
 
-def on_hinges(part: Any, structure: Discretized, folds: FoldHinges, place: str) -> OnHinges:
+def on_hinges(part: Any, structure: Discretized, place: str) -> OnHinges:
     """Where the springs of a stop or a latch act on the hinges of folds.
 
     In `plate`, whose panels are springs c in series with the crease and the spring beside it, these
     two act as one on the dihedral; see the module's text.
     """
+    folds = structure.body.sheet.fold_hinges()
     creases = resolve_creases(structure, part.creases, f"{place}.creases")
     angles, rest = np.zeros((2, len(structure.folds)))
     given = one_or_each(f"{place}.angle", part.angle, len(creases), "creases")
@@ -342,9 +343,9 @@ def on_hinges(part: Any, structure: Discretized, folds: FoldHinges, place: str) 
     law, at = structure.fold_law if memory is None else memory.elastic, angles[fold]
     slope = crease * law.slope(at, folds.rest[row])
     own = part.stiffness * folds.length[row]
-    moment = own / (1.0 + soft * (slope + own))
+    share = 1.0 / (1.0 + soft * (slope + own))
     angle = at + soft * crease * law.moment(at, folds.rest[row])
-    return OnHinges(row, angle, side[fold], moment / (1.0 + soft * slope), moment)
+    return OnHinges(row, angle, side[fold], own * share / (1.0 + soft * slope), share)
 
 
 @dataclass(frozen=True)
@@ -391,10 +392,9 @@ class Stop(Part):
                 f"{parts[0][0]}: superelements are linear, and stops are not; take bars and hinges "
                 "or a shell"
             )
-        return StopsTerm(
-            _packed(parts, structure, lambda part, on, share: on.stiffness),
-            structure.body.sheet.rows,
-        )
+        on = [on_hinges(part, structure, place) for place, part in parts]
+        stiffness = np.concatenate([one.stiffness for one in on])
+        return StopsTerm(_packed(on, stiffness, structure), structure.body.sheet.rows)
 
 
 def stop_dampers(
@@ -404,27 +404,26 @@ def stop_dampers(
     damped = [(place, part) for place, part in parts if part.damping]
     if not damped:
         return None
-    own = _packed(
-        damped, structure,
-        lambda part, on, share: part.damping / part.stiffness * on.moment * share,
-    )  # fmt: skip
-    return StopDampersTerm(own, structure.body.sheet.rows)
-
-
-def _packed(parts: Sequence[tuple[str, Any]], structure: Discretized, strength: Any) -> Stops:
-    """Arrays of stops with the strengths (h,) of each, by where it acts and its share of a turn."""
-    folds = structure.body.sheet.fold_hinges()
-    found = [(part, on_hinges(part, structure, folds, place)) for place, part in parts]
+    length = structure.body.sheet.fold_hinges().length
+    on = [on_hinges(part, structure, place) for place, part in damped]
     own = [
-        strength(part, on, on.moment / (part.stiffness * folds.length[on.row]))
-        for part, on in found
+        part.damping * length[one.row] * one.share**2
+        for one, (_, part) in zip(on, damped, strict=True)
     ]
-    row, limit, side, _, _ = map(np.concatenate, zip(*(on for _, on in found), strict=True))
-    stiffness = np.concatenate(own)
+    packed = _packed(on, np.concatenate(own), structure)
+    return StopDampersTerm(packed, structure.body.sheet.rows)
+
+
+def _packed(on: Sequence[OnHinges], strength: NDArray, structure: Discretized) -> Stops:
+    """Arrays of stops with their strengths (h,), where they act."""
+    folds = structure.body.sheet.fold_hinges()
+    row, limit, side = (
+        np.concatenate([getattr(one, name) for one in on]) for name in ("row", "angle", "side")
+    )
     rest = np.ascontiguousarray(structure.nodes, float)
     hidden = np.where(folds.hidden == NO_DOF, 0, folds.hidden)[row]
     corners = np.arange(4 * len(row)).reshape(-1, 4)
     still, _ = dihedrals_and_gradients(folds.corners[row].reshape(-1, 3), corners)
     still = np.where(folds.alone[row], still, np.nan)
-    arrays = limit, side, stiffness, hidden, folds.hidden_turn[row], still
+    arrays = limit, side, strength, hidden, folds.hidden_turn[row], still
     return Stops(rest, folds.nodes[row], *arrays)

@@ -185,20 +185,27 @@ def _check_tied_velocity(case: Case, velocity: NDArray) -> None:
         )
 
 
+def _check_lengths(springs: SpringsTerm, times: NDArray) -> None:
+    """Refuse winches that leave nothing of their cable at one of some times, s."""
+    lines = springs.springs.lines
+    for line in np.flatnonzero(lines.scaled & (lines.row[:, 0] >= 0)).tolist():
+        factor = springs.histories[lines.row[line, 0]](times)
+        gone = lines.natural[line] + lines.change[line] * factor <= 0.0
+        if gone.any():
+            raise InputError(
+                f"supports: the change of a cable (line {line}) leaves nothing of its "
+                f"{lines.natural[line]:.6g} m at t = {times[gone][0]:.6g} s; give a smaller change"
+            )
+
+
 def check_steady(case: Case, start: float, end: float) -> None:
     """Refuse jumps of supports, planes and folds, and of the wind with added mass.
 
     Refuses cables that a winch would use up, too.
     """
     springs = case.elastic_body.find(SpringsTerm)
-    for time in np.linspace(start, end, LOOKS) if springs and springs.histories else ():
-        assert springs is not None
-        lines = springs.at(lambda history, time=time: float(history(time))).springs.lines
-        if (gone := np.flatnonzero(lines.scaled & (lines.natural + lines.now[:, 0] <= 0.0))).size:
-            raise InputError(
-                f"supports: the change of a cable (line {gone[0]}) leaves nothing of its "
-                f"{lines.natural[gone[0]]:.6g} m at t = {time:.6g} s; give a smaller change"
-            )
+    if springs is not None:
+        _check_lengths(springs, np.linspace(start, end, LOOKS))
     for what, history in histories(case):
         times = [time for time in history.jumps() if start < time < end]
         drags = what == "the wind" and not (case.air and case.air.added_mass)

@@ -162,8 +162,8 @@ def _check(case: Case) -> None:
             ": cells do not touch each other; leave contact out of the case of a cell", "contact"
         )
     refuse_air(case, "an infinite sheet of cells")
-    refuse_cables(case.supports)
-    refuse_varying(case.supports)
+    refuse_cables(case)
+    refuse_varying(case)
     if case.modal_damping is not None:
         raise InputError(
             ": modes of one cell differ from modes of the sheet; take Rayleigh, crease or "

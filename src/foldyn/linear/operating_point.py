@@ -146,7 +146,7 @@ def _judge(
 
 def _flow(case: Case) -> str:
     """How the memory of a case counts: latches hold, but nothing yields."""
-    only = all(part.rows is not None or part.law.relaxes for part in case.remembering)
+    only = all(part.latches or part.law.relaxes for part in case.remembering)
     return FOLLOWED if case.latches and only else REFUSED
 
 

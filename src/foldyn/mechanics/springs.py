@@ -246,10 +246,15 @@ class SpringsTerm(Term):
         return np.concatenate([none, *pairs], axis=1)
 
     @cached_property
+    def _moves(self) -> NDArray[np.bool_]:
+        """Mask (k,) of the entries of the lines' blocks without the ground."""
+        return np.all(self._line_places >= 0, axis=0)
+
+    @cached_property
     def places(self) -> tuple[NDArray, NDArray]:
         """See `Term`."""
         row, column = places_of(pairs_of_ends(self.springs.ends))
-        lines = self._line_places[:, (self._line_places >= 0).all(axis=0)]
+        lines = self._line_places[:, self._moves]
         return np.concatenate([row, lines[0]]), np.concatenate([column, lines[1]])
 
     def entries(self, q: NDArray, floor: float = -np.inf) -> NDArray:
@@ -263,14 +268,15 @@ class SpringsTerm(Term):
         along = np.einsum("s,sa,sb->sab", stiffness, direction, direction)
         lines = np.zeros(self._line_places.shape[1])
         line_blocks(springs.lines, nodal(q), loose, lines)
-        lines = lines[(self._line_places >= 0).all(axis=0)]
-        return np.concatenate([blocks_of_ends(self.springs.ends, along).ravel(), lines])
+        return np.concatenate(
+            [blocks_of_ends(self.springs.ends, along).ravel(), lines[self._moves]]
+        )
 
     def unstrained(self, q: NDArray) -> Unstrained:
         """See `Term`."""
         size = (q.size, q.size)
         tangent = sparse.csr_array(sparse.coo_array((self._entries(q, True), self.places), size))
-        lines = self.springs.lines.stiffness * self._pulls(q)
+        lines = self.springs.lines.stiffness * self._acts(q)
         own = np.concatenate([self.springs.stiffness, lines]), *self._rows(q)
         return Unstrained(tangent, sparse.csr_array(size), partial(_stretch, *own))
 
@@ -314,7 +320,7 @@ class SpringsTerm(Term):
         """Internal constraints: directed springs, and lines to the ground; see `Term`."""
         nodes, rates = self._rows(q)
         grounded = np.array([(each < 0).any() for each in self._dofs], bool)
-        acts = [*np.ones(len(self.springs.ends), bool), *(grounded & self._pulls(q))]
+        acts = [*np.ones(len(self.springs.ends), bool), *(grounded & self._acts(q))]
         found = [pair for pair in compress(zip(nodes, rates, strict=True), acts) if pair[1].any()]
         for s in np.flatnonzero(self.tensions(q) > 0.0):  # taut pieces to the ground hold all ways
             own = self.springs.lines.node[slice(*self.springs.lines.first[s : s + 2])]
@@ -327,7 +333,7 @@ class SpringsTerm(Term):
         flat = (np.concatenate([np.zeros(0), *own]) for own in (unit, dofs))
         return sparse.csr_array((*flat, start), (len(found), q.size))
 
-    def _pulls(self, q: NDArray) -> NDArray[np.bool_]:
+    def _acts(self, q: NDArray) -> NDArray[np.bool_]:
         """Whether each line (c,) acts: it is no cable, or taut."""
         lines = self.springs.lines
         return ~lines.slack | (self.tensions(q) >= -JUST_TAUT * lines.stiffness * lines.natural)

@@ -55,10 +55,11 @@ def springs_and_masses(
         if isinstance(part, Spring)
         for line in _of_part(sheet, points, part, f"supports[{i}]", size, view)
     ]
+    polylines = case.polylines() if supports else ()
     for kind, text, width in ((Bar, "bar", 2.2), (Cable, "cable", 1.1)):
         lines = [
             np.where(node[:, None] < 0, x, points[node])[None]
-            for part, node, x in (case.polylines() if supports else ())
+            for part, node, x in polylines
             if isinstance(part, kind)
         ]
         if lines:

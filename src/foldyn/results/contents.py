@@ -10,7 +10,6 @@ import xarray as xr
 from foldyn.cases import Case
 from foldyn.cases.document import from_document, pattern_from_document
 from foldyn.errors import InputError
-from foldyn.materials.latching import Latching
 from foldyn.patterns import Pattern
 from foldyn.patterns.selection import given_as, select
 from foldyn.results.stored_case import document_of
@@ -165,12 +164,12 @@ def latched(result: xr.Dataset) -> xr.DataArray:
         The case has no latches.
     """
     case, at = case_of(result), 0
-    if not any(isinstance(part.law, Latching) for part in case.remembering):
+    if not case.latches:
         raise InputError(": has no latches; give its case fd.Latch", "result")
     state = result["memory"].transpose("branch", "variable", ...)[:, 0]
     holds = np.zeros((len(case.structure.folds), state.shape[1]), bool)
     for part in case.remembering:
-        if isinstance(part.law, Latching):
+        if part.latches:
             np.logical_or.at(holds, part.hinges.fold, state.values[at : at + part.count] > 0.0)
         at += part.count
     dims = str(state.dims[1]), "crease"

@@ -176,7 +176,7 @@ class OrigamiProblem(Problem):
         flow: str = REFUSED, memory: NDArray | str | None = None, timed: bool = False,
     ) -> None:  # fmt: skip
         refuse_wind(case, "statics")
-        refuse_varying(case.supports)
+        refuse_varying(case)
         if inertia_relief:
             refuse_air(case, "inertia relief")
             if case.structure.linear:

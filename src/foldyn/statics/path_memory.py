@@ -15,7 +15,6 @@ from foldyn.cases import Case
 from foldyn.errors import InputError
 from foldyn.materials.inelastic_law import VARIABLES
 from foldyn.materials.latching import CODE as LATCH
-from foldyn.materials.latching import Latching
 from foldyn.structures.inelastic_hinges import Remembering
 from foldyn.structures.inelastic_hinges import memory as memory_of
 
@@ -169,7 +168,7 @@ def _flows(case: Case, flow: str, timed: bool) -> tuple[Remembering, ...]:
     parts = tuple(part for part in case.remembering if timed or not part.law.relaxes)
     for part in parts:
         name, field = part.law.name, f"{part.kind}_law"
-        if isinstance(part.law, Latching) and flow == REFUSED:
+        if part.latches and flow == REFUSED:
             raise InputError(
                 ": latches make equilibria depend on the path, and only fd.simulate and fd.trace "
                 "follow them; elsewhere leave them out",

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.materials.inelastic_law import VARIABLES, Branch, MemoryLaw, memory_of
+from foldyn.materials.latching import Latching
 from foldyn.materials.law import PARAMETERS
 from foldyn.materials.prony import CODE as MAXWELL
 from foldyn.materials.prony import CreaseDampers, in_series, maxwell
@@ -32,6 +33,11 @@ class Remembering(NamedTuple):
     hinges: FoldHinges
     damping: NDArray
     rows: NDArray | None = None
+
+    @property
+    def latches(self) -> bool:
+        """Whether the hinges have latches in the place of a law."""
+        return isinstance(self.law, Latching)
 
     @property
     def count(self) -> int:
