@@ -23,15 +23,6 @@ def star(angles=ANGLES, welded=False, length=0.2, width=0.1, backwards=(1,)):
     return fd.Pattern(vertices, faces, welds=[(0, 1)] if welded else ())
 
 
-def double_box(side=1.27, height=2.54, welded=True):
-    """Two square cells, seven walls, with three walls at two of the vertical edges."""
-    corners = [(x, y) for y in (0, 1) for x in (0, 1, 2)]
-    vertices = [(side * x, side * y, z) for z in (0.0, height) for x, y in corners]
-    walls = [(0, 1), (1, 2), (3, 4), (4, 5), (0, 3), (1, 4), (2, 5)]
-    faces = [(a, b, b + 6, a + 6) for a, b in walls]
-    return fd.Pattern(vertices, faces, welds=[(k, k + 6) for k in range(6)] if welded else ())
-
-
 def stack(nx=1, ny=1, dihedral=110.0):
     """Two Miura layers, one the other's mirror image, that share the zigzag lines of ridges."""
     layer = fd.patterns.miura((nx, ny), a=0.04, b=0.04, dihedral=dihedral)

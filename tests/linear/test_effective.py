@@ -15,6 +15,7 @@ from foldyn.errors import FoldynWarning, InputError
 from foldyn.linear.effective import _solved, compliance, effective
 from foldyn.linear.linearized_cell import linearize_cell
 from foldyn.patterns.screw import of_twist, translation
+from verification.benchmarks.sheets import ANGLE, A, B, miura_of, ratio, thin
 
 BLOCKS = ("membrane", "coupling", "bending")
 
@@ -93,16 +94,6 @@ def test_flat_panels_of_other_models_bend_alike(make):
 
 
 # ---------------------------------------------------------------------- published sheets
-A, B, ANGLE = 0.03, 0.035, 60.0
-
-
-def thin(pattern, thickness, crease):
-    """Cell of a sheet that bends as one of 1 mm and 1 GPa, and hardly stretches."""
-    sheet = fd.Sheet(1e9 * (1e-3 / thickness) ** 3, 0.3, thickness)
-    structure = fd.discretize(pattern, sheet, crease_stiffness=crease, fold_law="linear")
-    return effective(fd.UnitCell(fd.Case(structure)))
-
-
 def rates(shape, angle):
     """Size of a cell (2,), and its derivatives by an angle (degrees)."""
     step = 1e-4
@@ -120,12 +111,11 @@ def miura_size(dihedral):
 @pytest.mark.parametrize("dihedral", [90.0, *map(slow, (20.0, 45.0, 135.0, 170.0))])
 def test_a_rigid_miura_sheet_has_the_published_ratios_and_moduli(dihedral):
     """nu = -cos^2 theta tan^2 gamma in the plane; opposite in bending (Wei et al., PRL 110)."""
-    pattern = fd.patterns.miura(a=A, b=B, panel_angle=ANGLE, dihedral=dihedral)
+    pattern, nu = miura_of(dihedral), ratio(dihedral)
     tilt, g = np.radians(180.0 - dihedral) / 2.0, np.radians(ANGLE)
-    ratio = -((np.cos(tilt) * np.tan(g)) ** 2)
     found = thin(pattern, 1e-5, 1e-2)
-    assert found.poissons_ratio.values == pytest.approx([ratio, 1 / ratio], rel=1e-5)
-    assert found.bending_poissons_ratio.values == pytest.approx([-ratio, -1 / ratio], rel=1e-3)
+    assert found.poissons_ratio.values == pytest.approx([nu, 1 / nu], rel=1e-5)
+    assert found.bending_poissons_ratio.values == pytest.approx([-nu, -1 / nu], rel=1e-3)
     size, rate = rates(miura_size, dihedral)
     p = 2.0 * np.arctan(np.cos(g) * np.tan(tilt))
     along_y = np.cos(g) * (np.cos(p / 2) / np.cos(tilt)) ** 2  # dp/dq of the straight creases
@@ -411,7 +401,7 @@ def test_a_secant_amplitude_gives_superlinear_bends_a_stiffness():
 
 
 def test_folding_without_resistance_has_the_ratio_of_the_mechanism():
-    pattern = fd.patterns.miura(a=A, b=B, panel_angle=ANGLE, dihedral=90.0)
+    pattern = miura_of(90.0)
     structure = fd.discretize(pattern, SHEET, crease_stiffness=0.0)
     with pytest.warns(FoldynWarning, match="costs no energy: one of strain xx, strain yy"):
         found = effective(fd.UnitCell(fd.Case(structure)))

@@ -11,26 +11,7 @@ from scipy.linalg import solve_continuous_lyapunov
 
 import foldyn as fd
 from foldyn.errors import FoldynWarning, InputError, ModelRangeWarning
-
-MASS, ZETA = 0.3, 0.02
-
-
-def chain(stiffness, masses, zeta=ZETA):
-    """Masses on nodes 1, 2, ... that move along x, each on a spring from the node before.
-
-    The sheet around them hardly resists, and has no mass.
-    """
-    soft = fd.Sheet(1e-9, 0.3, 1e-3)
-    made = fd.discretize(fd.patterns.simple_fold(dihedral=120), soft, preset="plate")
-    moving = list(range(1, len(masses) + 1))
-    others = [node for node in range(len(made.nodes)) if node not in moving]
-    supports = [fd.Fix(others, "xyz"), fd.Fix(moving, "yz")]
-    supports += [
-        fd.Spring(k, between=[(node - 1, node)], direction="x")
-        for node, k in zip(moving, stiffness, strict=True)
-    ]
-    points = [fd.PointMass([node], m) for node, m in zip(moving, masses, strict=True)]
-    return fd.Case(made, supports, damping=fd.ModalDamping(zeta), masses=points)
+from verification.benchmarks.noise import MASS, ZETA, chain
 
 
 def noise(value, low=1e-3, high=1e4, unit="m2/s3"):

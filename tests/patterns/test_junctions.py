@@ -6,7 +6,8 @@ import pytest
 import foldyn as fd
 from foldyn.errors import InputError
 from foldyn.patterns.geometry import face_geometry
-from junctions import copied, crease_of, double_box, stack, star
+from junctions import copied, crease_of, stack, star
+from verification.benchmarks.shells import double_box
 
 
 def test_neighbors_about_an_edge():

@@ -16,13 +16,6 @@ DEFLECTION = {
     ("supported", "center"): 0.01160,
 }
 
-# A. W. Leissa, The free vibration of rectangular plates, J. Sound Vib. 31, 257-293, 1973, square,
-# nu = 0.3: omega a^2 sqrt(rho t / D), by Ritz's method with 36 beam functions, so a little high
-LEISSA = {
-    "free": np.array([13.489, 19.789, 24.432, 35.024, 35.024, 61.526]),
-    "cantilevered": np.array([3.4917, 8.5246, 21.429, 27.331, 31.111, 54.443]),
-}
-
 # J. B. Kosmatka, Int. J. Numer. Methods Eng. 37, 431-455, 1994: a cantilever of graphite and epoxy,
 # 9 x 3 x 0.1 in, of plies from one face to the middle; Hz, measured at NASA Lewis by holography,
 # and by his element, which shears

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from plate_theory import DEFLECTION, LEISSA, navier_deflection, ritz_frequencies
+from plate_theory import DEFLECTION, navier_deflection, ritz_frequencies
 from shell_lab import (
     EAST,
     NORTH,
@@ -26,6 +26,7 @@ from foldyn.checks import observed_order
 from foldyn.mechanics.triangle import isotropic
 from foldyn.shells import shell
 from pairwise import beyond
+from verification.benchmarks.plates import LEISSA
 
 SHEET = fd.Sheet(1e6, 0.3, 0.01, density=2.0)
 RIM = (SOUTH, EAST, NORTH, WEST)

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from scipy import sparse
 from scipy.integrate import solve_ivp
-from scipy.optimize import brentq
+from scipy.optimize import brentq, fsolve
 from shell_lab import (
     WEST,
     at_rest,
@@ -29,6 +29,7 @@ from shell_lab import (
 import foldyn as fd
 from foldyn.checks import observed_order
 from pairwise import FEW
+from verification.benchmarks.large import BENCHMARKS, END_SHEAR, LEG, end_shear
 
 STRIP = fd.Sheet(1.2e6, 0.0, 0.1)
 EI = STRIP.youngs_modulus * STRIP.thickness**3 / 12.0  # of a width of one
@@ -114,12 +115,6 @@ def test_an_end_moment_rolls_a_strip_into_a_full_circle(mesh):
 
 # ------------------------------------------------------------------ bent by a force
 
-# load over 4: shortening and lift of the tip, L = 10 (Sze et al., table 1)
-END_SHEAR = {
-    0.1: (0.103, 1.309), 0.2: (0.381, 2.493), 0.4: (1.184, 4.292), 0.6: (2.002, 5.444),
-    0.8: (2.705, 6.190), 1.0: (3.286, 6.698),
-}  # fmt: skip
-
 
 def elastica(load, length):
     """Shortening and lift of the tip of an inextensible cantilever under a vertical dead load."""
@@ -136,23 +131,53 @@ def elastica(load, length):
 
 @pytest.mark.matrix
 def test_cantilever_under_end_shear():
-    errors, cells = [], np.array([8, 16, 32])
-    for nx in cells:
-        s, number, _ = strip(int(nx), max(1, nx // 10), 10.0)
-        share = np.full(number.shape[1], 1.0 / (number.shape[1] - 1))
-        share[[0, -1]] *= 0.5
-        q, found = at_rest(s), []
-        for part, table in END_SHEAR.items():
-            load = at_rest(s)
-            load[dofs(number[-1], "z")] = 4.0 * part * share
-            q = equilibrium(s, q, load, dofs(number[0]))
-            tip = split(s, q)[0][number[-1]].mean(axis=0)
-            found.append([-tip[0], tip[2]])
-            if nx == 32:
-                assert found[-1] == pytest.approx(table, rel=4e-3, abs=1e-3)
-        exact = np.array([elastica(4.0 * part, 10.0) for part in END_SHEAR])
-        errors.append(np.linalg.norm(np.array(found) - exact))
+    exact = np.array([elastica(4.0 * part, 10.0) for part in END_SHEAR])
+    cells = np.array([8, 16, 32])
+    found = [end_shear(int(n)) for n in cells]
+    assert found[-1] == pytest.approx(np.array([*END_SHEAR.values()]), rel=4e-3, abs=1e-3)
+    errors = [np.linalg.norm(each - exact) for each in found]
     assert observed_order(1.0 / cells, errors) == pytest.approx(2.0, abs=0.15)
+
+
+# ------------------------------------------------------------------ a frame
+
+
+def frame_load(drop, guess):
+    """Force on Lee's frame by shooting, its place this far down; an elastica that stretches.
+
+    guess, found : reactions at the foot, its angle, and the force.
+    """
+    stretching, bending = 720.0 * 6.0, 720.0 * 2.0
+
+    def along(start, x_force, z_force, length):
+        def slope(_, y):
+            c, s = np.cos(y[2]), np.sin(y[2])
+            stretch = 1.0 - (x_force * c + z_force * s) / stretching
+            moment = stretch * (z_force * c - x_force * s)
+            return [stretch * c, stretch * s, y[3] / bending, moment]
+
+        return solve_ivp(slope, [0.0, length], start, rtol=1e-8, atol=1e-10).y[:, -1]
+
+    def missed(unknown):
+        x_force, z_force, angle, load = unknown
+        corner = along([0.0, 0.0, angle, 0.0], x_force, z_force, LEG)
+        pushed = along(corner - [0, 0, 0.5 * np.pi, 0], x_force, z_force, 0.2 * LEG)
+        x, z, _, moment = along(pushed, x_force, z_force - load, 0.8 * LEG)
+        return [x - LEG, z - LEG, moment, pushed[1] - LEG + drop]
+
+    return fsolve(missed, guess)
+
+
+@pytest.mark.matrix
+def test_the_reference_of_lees_frame():
+    """Its largest load, by a parabola through three."""
+    found, loads, drops = np.array([0.0, 0.01, 0.5 * np.pi, 0.01]), [], [48.0, 48.7, 49.4]
+    for drop in (4.0, 12.0, 20.0, 28.0, 36.0, 44.0, *drops):
+        found = frame_load(drop, found)
+        loads.append(found[3])
+    a, b, c = np.polyfit(drops, loads[-3:], 2)
+    (row,) = (row for row in BENCHMARKS if row.name == "Lee's frame")
+    assert c - b**2 / (4.0 * a) == pytest.approx(row.reference[0], rel=1e-4)
 
 
 # ------------------------------------------------------------------ slit ring

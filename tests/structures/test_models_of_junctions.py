@@ -6,7 +6,7 @@ import pytest
 import foldyn as fd
 from foldyn import checks
 from foldyn.errors import InputError
-from junctions import ANGLES, SHEET, copied, crease_of, double_box, stack, star
+from junctions import ANGLES, SHEET, copied, crease_of, stack, star
 
 MODELS = {
     "herkal": lambda p, **more: fd.discretize(p, SHEET, preset="herkal", bend_law="linear", **more),
@@ -99,18 +99,6 @@ def test_models_agree():
     for model, error in (("plate", 0.05), ("n5b8e", 0.03), ("shell", 0.05)):
         found = frequencies(MODELS[model](pattern, crease_stiffness=0.5), held, 3)
         np.testing.assert_allclose(found, best, rtol=error)
-
-
-@pytest.mark.matrix
-def test_double_cell_box():
-    """Three walls at two lines: 20.28, 25.43, 28.79, 30.62 Hz (issue tracker of the project)."""
-    expected = [20.28, 25.43, 28.79, 30.62]
-    steel = fd.Sheet(207e9, 0.3, thickness=0.0127, density=7850.0)
-    shell = fd.shell(double_box(), steel, divisions=28, clamped="zmin")
-    found = frequencies(shell, [fd.Fix("zmin")], 4)
-    np.testing.assert_allclose(found, expected, rtol=0.02)
-    found = frequencies(fd.superelements(double_box(), steel, clamped="zmin"), [fd.Fix("zmin")], 4)
-    np.testing.assert_allclose(found, expected, rtol=0.003)
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,6 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from foldyn.cases import Case, Fix
 from foldyn.condensation import superelements
@@ -22,12 +21,12 @@ from foldyn.linear.reference import reference_modes, superelement_modes
 from foldyn.patterns import Pattern, kresling, miura_tube, yoshimura
 from foldyn.shells import shell
 from foldyn.structures import Sheet
+from verification.benchmarks import plates
+from verification.benchmarks.facets import facets, welded
 from verification.fidelity.compare import markdown
 
 STEEL = Sheet(2e11, 0.3, 1e-3, density=7850.0)
 MESHES = (8, 16, 24)
-NAFEMS = (0.421, 1.029, 2.582, 3.306, 3.753, 6.555)
-"""Frequencies (Hz) of FV16: NAFEMS, The Standard NAFEMS Benchmarks, 1990."""
 
 
 class Landmark(NamedTuple):
@@ -39,19 +38,6 @@ class Landmark(NamedTuple):
     options: dict[str, Any]
     supports: tuple[Fix, ...]
     known: Sequence[float] = ()
-
-
-def facets(x: NDArray, length: float, pieces: int, axis: int = 1) -> Pattern:
-    """A prism of quadrilaterals: a polyline x (k, 3), moved along an axis in several pieces."""
-    k, way = len(x), length / pieces * np.eye(3)[axis]
-    points = np.concatenate([x + j * way for j in range(pieces + 1)])
-    first = [j * k + i for j in range(pieces) for i in range(k - 1)]
-    return Pattern(points, [(i, i + 1, k + i + 1, k + i) for i in first])
-
-
-def welded(pattern: Pattern) -> Pattern:
-    """The pattern with all of its edges welded."""
-    return Pattern(pattern.vertices, pattern.faces, welds=pattern.creases.tolist())
 
 
 def strip(panels: int) -> Landmark:
@@ -71,7 +57,6 @@ def strip(panels: int) -> Landmark:
 
 def landmarks() -> list[Landmark]:
     """All structures."""
-    plate = Pattern([[0, 0, 0], [10, 0, 0], [10, 10, 0], [0, 10, 0]], [(0, 1, 2, 3)])
     turn = np.radians(np.linspace(0.0, 90.0, 6))
     arc = 0.03 * np.stack([np.sin(turn), 0.0 * turn, np.cos(turn)], axis=1)
     blade = welded(facets(arc, 0.2, 10))
@@ -82,8 +67,8 @@ def landmarks() -> list[Landmark]:
     cell = kresling(sides=6, radius=0.04, height=0.04, twist=30.0)
     return [
         Landmark(
-            "FV16, one panel", plate, Sheet(2e11, 0.3, 0.05, density=8000.0),
-            {"clamped": [(0, 3)]}, (Fix([0, 3], along=True),), NAFEMS,
+            "FV16, one panel", plates.SQUARE, plates.SHEET, {"clamped": [(0, 3)]},
+            (plates.ROOT,), plates.FV16,
         ),
         strip(2), strip(5), strip(20),
         Landmark("blade, welded facets of 9 x 20 mm", blade, STEEL, {}, (Fix("ymin", along=True),)),
