@@ -390,7 +390,7 @@ class Whole:
         squares = slope[:, None, None] * (self._roots.swapaxes(1, 2) @ self._roots)
         number += [len(stiffness) + k for k in range(len(slope))]
         size += [self.level.turns] * len(slope)
-        stiffness += list(squares.reshape(len(slope), -1))
+        stiffness += [square.ravel() for square in squares]
         place = np.cumsum([0, *map(len, stiffness)])
         every = sparse.csr_array(sparse.vstack([*rows, self._turns]) @ dofs)
         return Parts(

@@ -13,7 +13,7 @@ from foldyn.cases import Case
 from foldyn.errors import InputError
 from foldyn.gradients.expressions import Expression
 from foldyn.gradients.measures import Derivative, Seeds
-from foldyn.gradients.parameters import SHORTER, Differentiated, Parameters
+from foldyn.gradients.parameters import LONGER, SHORTER, Differentiated, Parameters
 from foldyn.mechanics.pullback import Arrays
 from foldyn.sweeps.measure import Asked
 
@@ -65,6 +65,7 @@ class Chain(NamedTuple):
     slopes: dict[str, Any]
     cut: bool  # whether cut lengths of bars are among the parameters
     shared: dict[Any, Any]  # intermediate results shared by measures
+    beside: Mapping[str, dict[str, NDArray]]  # derivatives of measures that are differenced
 
     def of(self, one: Wanted) -> tuple[float, dict[str, NDArray]]:
         """Value of a quantity, and derivatives with respect to all entries of each parameter."""
@@ -88,6 +89,8 @@ class Chain(NamedTuple):
                 "has no derivative by bar_length, the lengths to which bars are cut; leave it out "
                 "of the parameters, or take another measure, such as displacement"
             )
+        if derivative.beside:
+            return _Changes({}, self.beside[measure.text], {})
         places: list[dict[str, Any]] = [{}]
         if derivative.places:
             found = derivative.places(self._subject(measure), self.case, **measure.arguments)
@@ -130,7 +133,11 @@ class Chain(NamedTuple):
                 frozen.append((share, own))
         if frozen:
             total.explicit.update(
-                self._explicit(lambda case: sum(share * own(case) for share, own in frozen))
+                differenced(
+                    self.design,
+                    lambda case: {"": sum(share * own(case) for share, own in frozen)},
+                    SHORTER,
+                )[""]
             )
         return total
 
@@ -151,14 +158,42 @@ class Chain(NamedTuple):
         numbers = self.found.numbers(self.case).numbers
         return {name: np.zeros_like(array) for name, array in numbers.items()}
 
-    def _explicit(self, frozen: Callable[[Case], float]) -> dict[str, NDArray]:
-        """Derivatives of a measure with the result held fixed."""
 
-        def number(case: Case) -> Arrays:
-            return Arrays({"value": np.array([frozen(case)])}, {})
+def differenced(
+    design: Parameters, values: Callable[[Case], Mapping[str, float]], steps: Sequence[float]
+) -> dict[str, dict[str, NDArray]]:
+    """Derivatives of some functions of the case with respect to all entries of each parameter."""
 
-        slopes = self.design.slopes(number, SHORTER)
-        return {name: slope.pulled({"value": np.ones(1)}) for name, slope in slopes.items()}
+    def numbers(case: Case) -> Arrays:
+        return Arrays({text: np.array([value]) for text, value in values(case).items()}, {})
+
+    slopes = design.slopes(numbers, steps)
+    texts = next(iter(slopes.values())).by
+    return {
+        text: {name: slope.by[text].toarray()[0] for name, slope in slopes.items()}
+        for text in texts
+    }
+
+
+def beside(
+    found: Differentiated, design: Parameters, wanted: Sequence[Wanted]
+) -> dict[str, dict[str, NDArray]]:
+    """Derivatives of the measures that are differenced, all from the same results."""
+    measures = {
+        measure.text: measure
+        for one in wanted
+        for measure, derivative in one.measures.values()
+        if derivative.beside
+    }
+
+    def values(case: Case) -> dict[str, float]:
+        near, shared = found.beside(case), {}
+        return {text: one.number(near, case, shared) for text, one in measures.items()}
+
+    if not measures:
+        return {}
+    with said_of(", ".join(measures)):
+        return differenced(design, values, LONGER)
 
 
 @contextmanager

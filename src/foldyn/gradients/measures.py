@@ -38,6 +38,8 @@ class Derivative(NamedTuple):
     places : for an extreme, from the same arguments, all places that reach it; `seeds` and `frozen`
         take one of them as `at`. The measure has a derivative if it is the same at all places.
     cut : whether the measure depends on the cut lengths of bars, in addition to the result.
+    beside : whether the measure is differenced, from results of slightly different cases; nothing
+        else is needed then.
     """
 
     seeds: Callable[..., Seeds]
@@ -45,6 +47,7 @@ class Derivative(NamedTuple):
     numbers: Callable[..., Gradient] | None = None
     places: Callable[..., Sequence[Any]] | None = None
     cut: bool = False
+    beside: bool = False
 
 
 def _largest(numbers: NDArray) -> list[tuple[int, ...]]:
@@ -399,6 +402,9 @@ DERIVATIVES: Mapping[str, Derivative] = {
     "strain": Derivative(_strain, _strain_of, places=_strained_most, cut=True),
     "strain_energy": Derivative(_strain_energy, _strain_energy_of, places=_tensest, cut=True),
     "clearance": Derivative(_clearance, _clearance_of, places=_closest),
+    **dict.fromkeys(
+        ("von_mises", "crease_moment", "margin"), Derivative(_nothing, cut=True, beside=True)
+    ),
     "reaction": Derivative(_reaction),
     "limit_load": Derivative(_limit_load),
     "load_at": Derivative(_load_at),

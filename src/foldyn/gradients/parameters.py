@@ -36,6 +36,7 @@ from foldyn.values import numbers, show
 STEP = 1e-3  # step of a difference, relative to the size of the parameter
 # steps tried in turn for measures, such as energies near a kink of a law
 SHORTER = STEP, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8
+LONGER = STEP, 1e-2  # the same for measures whose rounding hides small changes
 SMOOTH = 1e-5  # a step is short enough if the third-order part is below this fraction of a change
 LEAST = 1e-6  # changes below this fraction of a value are lost in round-off
 GOLDEN = 0.6180339887498949  # multiples of this number modulo 1 are all distinct
@@ -106,6 +107,13 @@ class Differentiated:
         seeds : derivatives of the function with respect to variables of the result.
         """
         raise NotImplementedError
+
+    def beside(self, case: Case) -> xarray.Dataset:
+        """Result of a slightly different case, to be differenced."""
+        raise InputError(
+            "has derivatives of paths only; vary the parameters by fd.sweep, or take a path with "
+            "the load in question"
+        )
 
 
 def numbers_of_motion(packed: PackedCase, start: tuple[NDArray, NDArray]) -> Arrays:
@@ -331,7 +339,7 @@ def _kinked(
     """
     bent, far = np.abs(ahead + behind), np.abs(far_ahead + far_behind)
     least = max(
-        1e-3 * np.abs(ahead - behind).max(initial=0.0), 1e-9 * np.abs(here).max(initial=0.0)
+        1e-3 * np.abs(ahead - behind).max(initial=0.0), 1e-8 * np.abs(here).max(initial=0.0)
     )
     return bool(((bent > least) & (far < 3.0 * bent)).any())
 

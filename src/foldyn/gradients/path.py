@@ -17,21 +17,26 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+import xarray
 from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from foldyn.cases import Case
-from foldyn.errors import InputError
+from foldyn.errors import ComputationError, InputError
 from foldyn.gradients.parameters import Differentiated, Gradient, check_known, nothing
 from foldyn.mechanics.pullback import Pullback, refuse_lacking
+from foldyn.results.dataset import result_dataset
 from foldyn.statics import trace
 from foldyn.statics.energy_landscape import Moved, load_at
+from foldyn.statics.equilibrium import OrigamiProblem
+from foldyn.statics.newton import Settings, Solver
 from foldyn.statics.stability import softest_modes
 
 KNOWN = ("displacement", "reaction", "load_factor", "load_at")
 GIVEN = ("newton", "displacement")
 """Methods that find the points of a path at given load factors."""
+CLOSE = Settings(tolerance=1e-12)  # of states that are differenced
 DENSE = 300  # up to this many dofs, the shape at a limit point is found from a dense matrix
 SINGULAR = 1e-13  # a motion with less than this fraction of the largest stiffness is critical
 
@@ -154,6 +159,31 @@ class PathGradient(Differentiated):
             self._add_factor(moved, Balance(self.case, q).under(unit), seed, total)
         return total
 
+    def beside(self, case: Case) -> xarray.Dataset:
+        """Path of a slightly different case, at the same load factors."""
+        self._check_given(0)
+        problem, moved = OrigamiProblem(case), []
+        solver, factors = Solver(problem, CLOSE), self.result["load_factor"].values
+        places = self.result["displacement"].transpose("step", "node", "axis").values
+        for place, factor in zip(places, factors.tolist(), strict=True):
+            found = solver.correct(problem.state(place, factor), factor)
+            if found.failure:
+                raise ComputationError(
+                    f"no equilibrium near the state at the factor {factor:g}: {found.failure}"
+                )
+            moved.append(problem.displacement(found.u))
+        along = {"load_factor": ("step", factors)}
+        return result_dataset(
+            "path", case, {"displacement": (("step", "node", "axis"), moved, {})}, along, {}
+        )
+
+    def _check_given(self, k: int) -> None:
+        if not self._given:
+            raise InputError(
+                f"point {k} of the path has no given load factor, and moves along the path as the "
+                'design changes: take method = "newton" or "displacement", or load_at[...]'
+            )
+
     def _add_point(self, k: int, seeds: Mapping[str, Any], total: dict[str, NDArray]) -> None:
         """Add what a point contributes by its displacement, reactions and load factor."""
         case, result = self.case, self.result
@@ -171,11 +201,7 @@ class PathGradient(Differentiated):
             self._add_factor(Moved(u, factor), self._soft(q), float(climbed[0]), total)
         if not (moved.any() or pulled.any()):
             return
-        if not self._given:
-            raise InputError(
-                f"point {k} of the path has no given load factor, and moves along the path as the "
-                'design changes: take method = "newton" or "displacement", or load_at[...]'
-            )
+        self._check_given(k)
         by_state, size = np.zeros(len(q)), u.size
         by_state[:size] += moved
         if pulled.any():

@@ -25,7 +25,7 @@ from foldyn.cases.models import BARS_AND_HINGES
 from foldyn.dynamics import simulate
 from foldyn.dynamics.inertia import is_lumped
 from foldyn.errors import InputError, within
-from foldyn.gradients.chain import Chain, Wanted
+from foldyn.gradients.chain import Chain, Wanted, beside
 from foldyn.gradients.expressions import parse
 from foldyn.gradients.measures import Derivative, Seeds, derivative_of, one_number
 from foldyn.gradients.motion import MotionGradient
@@ -155,7 +155,7 @@ def sensitivity(
     direction = None if along is None else _direction(along, design)
     if direction is not None and isinstance(found, ModesGradient):
         found = found.along(lambda gradient: _rate(slopes, direction, gradient))
-    chain = Chain(found, case, design, slopes, cut, {})
+    chain = Chain(found, case, design, slopes, cut, {}, beside(found, design, wanted))
     values, gradients = zip(*(chain.of(one) for one in wanted), strict=True)
     data: dict[str, Any] = {"value": ("measure", np.array(values))}
     if direction is None:

@@ -111,7 +111,12 @@ def stresses(result: xarray.Dataset) -> xarray.Dataset:
     >>> found.von_mises.max().item() > 0.0
     True
     """
-    case, kind = case_of(result), str(result.attrs["foldyn_result"])
+    return stresses_of(case_of(result), result)
+
+
+def stresses_of(case: Case, result: xarray.Dataset) -> xarray.Dataset:
+    """Stresses in all states of a result of a case; see `stresses`."""
+    kind = str(result.attrs["foldyn_result"])
     if kind not in ALONG:
         raise InputError(
             f": a result of the kind {kind!r} has no stresses of its own; give a path, a motion, "

@@ -14,7 +14,7 @@ from foldyn.errors import InputError, warn
 from foldyn.linear.frf import quantity_of
 from foldyn.linear.margins import margins
 from foldyn.linear.peaks_of import kind_of, resonances
-from foldyn.linear.stresses import stresses
+from foldyn.linear.stresses import stresses_of
 from foldyn.mechanics.contact.clearance import Clearance, clearance
 from foldyn.signals import Peaks, find_peaks, half_power, log_decrement, sampling_interval, spectrum
 from foldyn.statics import Landscape, landscape
@@ -277,7 +277,7 @@ def _strain(result: xr.Dataset, case: Case) -> float:
 
 
 def _stressed(result: xr.Dataset, case: Case) -> xr.Dataset:
-    return stresses(result)
+    return stresses_of(case, result)
 
 
 _ONCE = {"whole": True, "through": _stressed}
