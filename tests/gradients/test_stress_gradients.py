@@ -38,7 +38,7 @@ def test_stress_falls_with_the_square_of_the_thickness(model):
     )  # fmt: skip
     stress, margin = found["value"].values
     falls, grows = 5e-3 * found["gradient_thickness"].values
-    np.testing.assert_allclose([falls / stress, grows / (margin + 1.0)], [-2.0, 2.0], rtol=5e-3)
+    np.testing.assert_allclose([falls / stress, grows / (margin + 1.0)], [-2.0, 2.0], rtol=0.01)
     if model == "shell":
         narrower, _ = 0.1 * found["gradient_width"].values
         np.testing.assert_allclose(narrower / stress, -1.0, rtol=0.01)
@@ -70,7 +70,8 @@ def test_gradients_agree_with_differences(model):
     design = Design(lambda **given: folded(model, **given), values, measures, PATH)
     design.step = 2e-2 if model == "superelements" else 2e-3
     errors = design.errors()
-    assert max(errors.values()) < 5e-4, errors  # stresses are rounded at 1e-9
+    rough = 3e-3 if model == "superelements" else 5e-4  # stresses are rounded at 1e-9
+    assert max(errors.values()) < rough, errors
 
 
 @pytest.mark.matrix
@@ -96,5 +97,5 @@ def test_what_has_no_gradient_is_refused():
     moving = {"kind": "dynamics", "duration": 1e-3, "dt": 1e-4, "method": "rk4"}
     with pytest.raises(InputError, match=r"crease_moment.*derivatives of paths only"):
         fd.sensitivity(build, {"x": 0.02}, measures="crease_moment", analysis=moving)
-    with pytest.raises(InputError, match="crease_moment: .*bar_length"):
+    with pytest.raises(InputError, match=r"crease_moment: .*bar_length"):
         fd.sensitivity(build(0.02), ["bar_length"], measures="crease_moment", analysis=PATH)

@@ -13,7 +13,7 @@ from foldyn.cases import Case
 from foldyn.errors import InputError
 from foldyn.gradients.expressions import Expression
 from foldyn.gradients.measures import Derivative, Seeds
-from foldyn.gradients.parameters import LONGER, SHORTER, Differentiated, Parameters
+from foldyn.gradients.parameters import SHORTER, STEP, Differentiated, Parameters
 from foldyn.mechanics.pullback import Arrays
 from foldyn.sweeps.measure import Asked
 
@@ -193,7 +193,7 @@ def beside(
     if not measures:
         return {}
     with said_of(", ".join(measures)):
-        return differenced(design, values, LONGER)
+        return differenced(design, values, [STEP])
 
 
 @contextmanager

@@ -36,7 +36,6 @@ from foldyn.values import numbers, show
 STEP = 1e-3  # step of a difference, relative to the size of the parameter
 # steps tried in turn for measures, such as energies near a kink of a law
 SHORTER = STEP, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8
-LONGER = STEP, 1e-2  # the same for measures whose rounding hides small changes
 SMOOTH = 1e-5  # a step is short enough if the third-order part is below this fraction of a change
 LEAST = 1e-6  # changes below this fraction of a value are lost in round-off
 GOLDEN = 0.6180339887498949  # multiples of this number modulo 1 are all distinct
