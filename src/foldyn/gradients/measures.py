@@ -18,6 +18,7 @@ from foldyn.linear.frf import quantity_of
 from foldyn.signals.peaks import magnitude_curve
 from foldyn.statics import Equilibrium, Landscape
 from foldyn.sweeps import measures
+from foldyn.sweeps.cell_measures import PROPERTIES
 from foldyn.sweeps.measure import Asked, asked
 from foldyn.viewer.states import bar_strain
 
@@ -403,7 +404,8 @@ DERIVATIVES: Mapping[str, Derivative] = {
     "strain_energy": Derivative(_strain_energy, _strain_energy_of, places=_tensest, cut=True),
     "clearance": Derivative(_clearance, _clearance_of, places=_closest),
     **dict.fromkeys(
-        ("von_mises", "crease_moment", "margin"), Derivative(_nothing, cut=True, beside=True)
+        ["von_mises", "crease_moment", "margin", *PROPERTIES],
+        Derivative(_nothing, cut=True, beside=True),
     ),
     "reaction": Derivative(_reaction),
     "limit_load": Derivative(_limit_load),

@@ -25,6 +25,7 @@ from foldyn.cases.models import BARS_AND_HINGES
 from foldyn.dynamics import simulate
 from foldyn.dynamics.inertia import is_lumped
 from foldyn.errors import InputError, within
+from foldyn.gradients.cells import CellGradient
 from foldyn.gradients.chain import Chain, Wanted, beside
 from foldyn.gradients.expressions import parse
 from foldyn.gradients.measures import Derivative, Seeds, derivative_of, one_number
@@ -33,10 +34,11 @@ from foldyn.gradients.parameters import Differentiated, Gradient, Parameters, Sl
 from foldyn.gradients.path import PathGradient
 from foldyn.gradients.vibrations import FrfGradient, ModesGradient
 from foldyn.input_files import path_of
-from foldyn.linear import frf, modes
+from foldyn.linear import effective, frf, modes
 from foldyn.statics import trace
 from foldyn.structures import Structure
 from foldyn.structures.discretized import Discretized
+from foldyn.sweeps.cell_measures import EFFECTIVE
 from foldyn.sweeps.job import ASIDE
 from foldyn.sweeps.measure import of_callable
 from foldyn.values import choice, listed, of_kind, show
@@ -46,10 +48,11 @@ KINDS: Mapping[str, Callable[[Case, Mapping[str, Any]], Differentiated]] = {
     "dynamics": MotionGradient,
     "statics": PathGradient,
     "frf": FrfGradient,
+    "effective": CellGradient,
 }
 """Analyses with gradients, by their kind in case files."""
 FUNCTIONS: Mapping[str, Callable[..., Any]] = {
-    "modes": modes, "frf": frf, "dynamics": simulate, "statics": trace,
+    "modes": modes, "frf": frf, "dynamics": simulate, "statics": trace, "effective": effective,
 }  # fmt: skip
 """Function of each analysis; its signature defines the arguments of the analysis."""
 LENGTH = "bar_length"
@@ -91,8 +94,9 @@ def sensitivity(
         functions of the result and the case: one returns the measure, the other its derivatives
         with respect to variables of the result, by name.
     analysis : mapping, optional
-        The analysis: its kind, "modes", "statics", "dynamics" or "frf", and arguments of
-        `fd.modes`, `fd.trace`, `fd.simulate` or `fd.frf`. A case file contains its own analysis.
+        The analysis: its kind, "modes", "statics", "dynamics", "frf" or "effective", and arguments
+        of `fd.modes`, `fd.trace`, `fd.simulate`, `fd.frf` or `fd.effective`; for the last, `build`
+        returns a `UnitCell`. A case file contains its own analysis.
     sizes : mapping, optional
         Sizes of parameters that are 0 where the gradient is taken: differences change a parameter
         by a thousandth of its size.
@@ -326,12 +330,14 @@ def _of_file(
             "initial",
             place,
         )
-    analysis = own.analysis
+    kind = own.analysis.kind
+    whole = kind == EFFECTIVE  # the file says how its cell repeats, and in which state
 
-    def build(**values: Any) -> Case:
-        return case_file_at(place, document, values).case()
+    def build(**values: Any) -> Any:
+        made = case_file_at(place, document, values)
+        return made if whole else made.case()
 
-    return build, checked(parameters), {"kind": analysis.kind, **analysis.arguments}
+    return build, checked(parameters), {"kind": kind, **({} if whole else own.analysis.arguments)}
 
 
 # ------------------------------------------------------------------ measures

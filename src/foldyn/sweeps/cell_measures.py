@@ -82,7 +82,7 @@ def _property(name: str, result: xr.Dataset, case: Case, **labels: str) -> float
     """A number of the equivalent plate or beam, by its labels."""
     own = "stiffness" if name == "coupling" and "stiffness" in result else name
     if own not in result:
-        raise InputError("is for sheets; a chain or tube has coupling")
+        raise InputError(f"this cell has none; it has {', '.join(map(str, result.data_vars))}")
     at = {"direction" if dim == AXIS else dim: label for dim, label in labels.items()}
     if "load" in at:
         at.setdefault("strain", at["load"])
@@ -91,8 +91,10 @@ def _property(name: str, result: xr.Dataset, case: Case, **labels: str) -> float
     return float(result[own].sel(at))
 
 
-OF_CELLS |= {
-    name: Measure(name, (EFFECTIVE,), partial(_property, name), units, doc, takes=takes, needs=1)
+PROPERTIES = {
+    name: Measure(
+        name, (EFFECTIVE,), partial(_property, name), units, doc, takes=takes, needs=len(takes[:1])
+    )
     for takes, rows in {
         (AXIS,): (
             ("poissons_ratio", "1", "Poisson's ratio under forces along an axis of the sheet"),
@@ -105,9 +107,18 @@ OF_CELLS |= {
             ("bending", "N m", "bending stiffness of the sheet"),
             ("coupling", "", "forces per curvature of the sheet, or stiffness of the chain"),
         ),
+        (): (
+            ("shear_modulus", "N/m", "shear modulus of the sheet"),
+            ("twisting_modulus", "N m", "moment of twist of the sheet per unit of twist"),
+            ("axial_stiffness", "N", "EA of the chain"),
+            ("torsional_stiffness", "N m2", "GJ of the chain"),
+            ("density", "", "mass per area of the sheet, or per length of the chain"),
+        ),
     }.items()
     for name, units, doc in rows
 }
+"""Measures of the equivalent plate or beam by name."""
+OF_CELLS |= PROPERTIES
 
 
 def _gap_ends(result: xr.Dataset, band: int, leg: str) -> tuple[float, float]:

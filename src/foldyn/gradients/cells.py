@@ -1,0 +1,43 @@
+"""Gradients of effective properties, which are differenced: each changed cell is computed anew."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import xarray
+
+from foldyn.analyses import CaseFile
+from foldyn.errors import quietly
+from foldyn.gradients.parameters import Differentiated
+from foldyn.linear import UnitCell, effective
+from foldyn.mechanics.pullback import Arrays
+
+
+class CellGradient(Differentiated):
+    """Effective properties of a cell, or of that of a case file.
+
+    Parameters
+    ----------
+    cell : UnitCell or CaseFile
+    arguments : mapping
+        Arguments of `fd.effective`; a file has its own.
+    """
+
+    def __init__(self, cell: UnitCell | CaseFile, arguments: Mapping[str, Any]) -> None:
+        self._arguments = arguments
+        self.result = self._computed(cell)
+
+    def numbers(self, case: Any) -> Arrays:
+        """Nothing: no measure has an adjoint."""
+        return Arrays({}, {})
+
+    def beside(self, case: Any) -> xarray.Dataset:
+        """Properties of a slightly different cell."""
+        with quietly():
+            return self._computed(case)
+
+    def _computed(self, cell: UnitCell | CaseFile) -> xarray.Dataset:
+        if isinstance(cell, CaseFile):
+            return cell.computation().result()
+        return effective(cell, **self._arguments)
