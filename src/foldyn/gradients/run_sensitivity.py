@@ -43,7 +43,7 @@ from foldyn.sweeps.job import ASIDE
 from foldyn.sweeps.measure import of_callable
 from foldyn.values import choice, listed, of_kind, show
 
-KINDS: Mapping[str, Callable[[Case, Mapping[str, Any]], Differentiated]] = {
+KINDS: Mapping[str, Callable[[Any, Mapping[str, Any]], Differentiated]] = {
     "modes": ModesGradient,
     "dynamics": MotionGradient,
     "statics": PathGradient,
