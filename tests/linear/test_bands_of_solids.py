@@ -146,13 +146,6 @@ def test_stiffness_of_a_honeycomb(model):
     assert (found.bending_poissons_ratio < 1.0 + 1e-9).all()
 
 
-def test_solids_have_no_equivalent_plate():
-    above, _, steps = layers()
-    cell = fd.UnitCell(fd.Case(MODELS["plate"](above)), steps)
-    with pytest.raises(InputError, match="repeats in three directions"):
-        fd.effective(cell)
-
-
 def test_letters_of_creases_that_are_junctions_between_cells_are_refused():
     pattern = honeycomb(IN_A_ROW)
     made = fd.discretize(pattern, SHEET, preset="plate", crease_stiffness={"mountain": 0.2})

@@ -1,4 +1,4 @@
-"""The equivalent plate or beam of a repeated case: [analysis] of kind "effective"."""
+"""The equivalent plate, beam or solid of a repeated case: [analysis] of kind "effective"."""
 
 from __future__ import annotations
 
@@ -25,7 +25,8 @@ MATRICES = {
 NOUGHT = 1e-10  # of these scales: smaller numbers are round-off
 STATE = ("center", "frame", "vectors", "angles", "axes", "points", "displacement")
 MEANING = (
-    "Loads are forces and moments per length of the sheet, or of the whole chain; creases and "
+    "Loads are forces and moments per length of the sheet, or of the whole chain, or stresses of "
+    "a solid; creases and "
     "panels of the cell are relaxed under each mean strain and curvature. Poisson's ratios and "
     "moduli of stretching are those of a sheet that stays flat, those of bending of one without "
     "mean forces. Directions x and y are the first two axes of the frame."
@@ -48,7 +49,7 @@ class EffectiveSchema(CellSchema):
 
 
 class EffectiveAnalysis(Analysis):
-    """Stiffness of the equivalent plate of a sheet that repeats, or beam of a chain."""
+    """Stiffness of what is equivalent to a sheet that repeats: a plate, beam or solid."""
 
     kind = "effective"
     schema = EffectiveSchema
@@ -98,7 +99,7 @@ class EffectiveAnalysis(Analysis):
         others = [
             [str(name).replace("_", " "), _listed(one), one.units]
             for name, one in result.data_vars.items()
-            if one.size <= 4 and name not in (*MATRICES, *STATE) and "units" in one.attrs
+            if one.size <= 6 and name not in (*MATRICES, *STATE) and "units" in one.attrs
         ]
         yield Table(["property", "value", "unit"], others, f"{case_file.path.name}: properties")
         yield Text(MEANING)
@@ -106,6 +107,6 @@ class EffectiveAnalysis(Analysis):
 
 def _listed(values: xarray.DataArray) -> str:
     """Numbers of a variable, each after its direction, if it has one."""
-    names = [f"{one} " for one in values.coords.get("direction", xarray.DataArray([])).values]
+    names = [f"{one} " for dim in values.dims if dim in values.coords for one in values[dim].values]
     numbers = [f"{each:.4g}" for each in values.values.ravel()]
     return ", ".join(map("".join, zip(names or [""] * len(numbers), numbers, strict=True)))

@@ -1,11 +1,12 @@
-"""`effective`: a repeated sheet as an equivalent plate, a chain or tube as an equivalent beam.
+"""`effective`: repeated sheets as plates, chains and tubes as beams, and solids.
 
 The strain energy of a cell under mean strains e, relaxed, is 1/2 e . C e per area or length. For a
 plate e = (E_xx, E_yy, 2 E_xy, k_xx, k_yy, 2 k_xy), with the curvature k = -grad grad w about the
 plane through the center of mass, and C = [[A, B], [B', D]]. For a beam e is its stretch, its twist
 and its curvatures about two axes across it (rad/m). Bending a screw chain is a wave whose phase is
 the angle of the screw, in axes that turn with the cells: it couples with stretch and twist only if
-this angle vanishes, and is the same about all axes unless it is half a turn.
+this angle vanishes, and is the same about all axes unless it is half a turn. For a solid e holds
+the six mean strains, and the energy is that per volume.
 
 M. Schenk, S. D. Guest, Proc. Natl. Acad. Sci. 110, 2013; Z. Y. Wei, Z. V. Guo, L. Dudte,
 H. Y. Liang, L. Mahadevan, Phys. Rev. Lett. 110, 2013.
@@ -23,6 +24,7 @@ its second derivative is exact: internal forces in the state do work in terms of
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, NamedTuple
 
@@ -43,6 +45,8 @@ from foldyn.values import of_kind
 
 STRAINS = ("xx", "yy", "xy")
 BEAM = ("stretch", "twist", "bend_1", "bend_2")
+SOLID = ("xx", "yy", "zz", "yz", "xz", "xy")
+PAIRS = np.array([(0, 1), (0, 2), (1, 0), (1, 2), (2, 0), (2, 1)])  # of directions
 SOFT = 1e-12  # stiffness of a strain, relative to the stiffest, below which it counts as zero
 BOUNDLESS = 1e60  # stands for an infinite compliance, m/N or 1/(N m)
 NOISE = 1e-6  # shares of a strain below this are round-off
@@ -60,7 +64,7 @@ def effective(
     secant: float | None = None,
     load_factor: float = 1.0,
 ) -> xarray.Dataset:
-    """Stiffness of the plate that is equivalent to a repeated sheet, or of the beam to a chain.
+    """Stiffness of the plate, beam or solid that is equivalent to a repeated sheet.
 
     Creases and panels of a cell are relaxed under each mean strain and curvature. Poisson's ratios
     and moduli of stretching are those of a sheet that stays flat, those of bending of one without
@@ -69,8 +73,8 @@ def effective(
     Parameters
     ----------
     cell : UnitCell
-        Cell under two translations (a sheet), or under one translation or screw (a chain or tube),
-        without supports.
+        Cell under two translations (a sheet), under one translation or screw (a chain or tube), or
+        under three translations (a solid), without supports.
     state : State, optional
         Equilibrium of the repeated sheet, as `fd.linear.relaxed` finds it; by default rest.
     secant, load_factor : float
@@ -92,8 +96,12 @@ def effective(
         (N) and moments (N m) per stretch and per turn (rad/m) about the rows of `frame`: the axis,
         and two axes across it; `axial_stiffness` EA (N), `torsional_stiffness` GJ (N m2) with the
         other strains held, `stretch_twist` (N m); `bending_stiffness` EI (axis, N m2), the lesser
-        and the greater, about axes through the neutral point; `density` (kg/m). Of both
-        `mean_load`, forces and moments in the state, and its variables as in `bands`.
+        and the greater, about axes through the neutral point; `density` (kg/m).
+        Of a solid: `stiffness` (load, strain), Pa, in the order xx, yy, zz, yz, xz, xy, shear
+        counted twice, along the axes of space; `modulus` (direction) and `shear_modulus` (plane),
+        Pa; `poissons_ratio` (pair): of "xy", minus the strain along y divided by that along x,
+        under a stress along x; `density` (kg/m3). Of all `mean_load`, forces, moments or stresses
+        in the state, and its variables as in `bands`.
 
     Raises
     ------
@@ -122,10 +130,6 @@ def effective(
     structure = case.structure
     if case.supports or getattr(structure.options, "clamped", ()):
         raise InputError(": has supports or clamped edges, and a free material has none", "cell")
-    if cell.dimensions == 3:
-        raise InputError(
-            ": repeats in three directions; `effective` takes sheets, chains and tubes", "cell"
-        )
     weighed = structure.sheet.density is not None
     if not weighed:
         light = replace(structure, sheet=structure.sheet.weighed).marked()
@@ -137,21 +141,18 @@ def effective(
             "stiffer than the creases",
             "cell",
         )
-    energy, plate = CellEnergy(linear, amplitude_of(secant)), cell.dimensions == 2
-    frame, size = _plate_frame(linear) if plate else _beam_frame(linear)
-    whole, loads = (_plate if plate else _beam)(linear, energy, frame)
+    energy = CellEnergy(linear, amplitude_of(secant))
+    kind = KINDS[cell.dimensions]
+    frame, size = kind.frame(linear)
+    whole, loads = kind.stiffness(linear, energy, frame)
     matrix = whole / size
-    _warn_of(linear, matrix, loads / size)
-    found = (plate_properties if plate else beam_properties)(matrix, loads / size)
+    _warn_of(linear, kind, matrix, loads / size)
+    found = kind.properties(matrix, loads / size)
     if weighed:
-        unit = "kg/m2" if plate else "kg/m"
-        found["density"] = (), energy.mass.sum() / size, {"units": unit}
+        found["density"] = (), energy.mass.sum() / size, {"units": kind.density}
     found["center"] = "axis", energy.center, {"units": "m"}
     found["frame"] = ("own_axis", "axis"), frame, {"units": "1"}
-    along: dict[str, Any] = {"load": list(STRAINS if plate else BEAM)}
-    along["strain"] = along["load"]
-    if plate:
-        along |= {"direction": ["x", "y"], "angle": ("angle", ANGLES, {"units": "degrees"})}
+    along = kind.coordinates | {"strain": kind.coordinates["load"]}
     facts = {"residual": linear.residual, "wall_seconds": time.perf_counter() - began}
     return result_dataset("effective", cell.case, found | linear.variables, along, facts)
 
@@ -236,13 +237,29 @@ def _beam(linear: LinearizedCell, energy: CellEnergy, frame: NDArray) -> tuple[N
     return out, loads
 
 
-def _warn_of(linear: LinearizedCell, matrix: NDArray, loads: NDArray) -> None:
+def _solid_frame(linear: LinearizedCell) -> tuple[NDArray, float]:
+    """Axes of space (3, 3), and the volume (m3) of a cell."""
+    return np.eye(3), abs(float(np.linalg.det(linear.vectors)))
+
+
+def _solid(linear: LinearizedCell, energy: CellEnergy, frame: NDArray) -> tuple[NDArray, NDArray]:
+    """Stiffness (6, 6) and loads (6,), J, of a cell under strains."""
+    tensors = np.zeros((6, 3, 3))
+    for k, (i, j) in enumerate([(0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1)]):
+        tensors[k, i, j] += 0.5
+        tensors[k, j, i] += 0.5
+    move = np.einsum("di,kij->dkj", linear.vectors, tensors)
+    strains = _strains(linear, np.zeros_like(move), move, energy.center)
+    still = energy.rigid(np.zeros((3, 3)), np.eye(3))
+    return energy.stiffness(strains, np.zeros(3), still), energy.loads(strains)
+
+
+def _warn_of(linear: LinearizedCell, kind: Equivalent, matrix: NDArray, loads: NDArray) -> None:
     """Warn of an unstable state, of strains without stiffness, and of mean forces."""
-    plate, size = len(matrix) == 6, linear.cell.case.structure.pattern.size
-    names = [f"{of} {name}" for of in ("strain", "curvature") for name in STRAINS]
-    names, straight = (names, 3) if plate else (list(BEAM), 1)
+    names, straight, size = kind.names, kind.straight, linear.cell.case.structure.pattern.size
     unit = np.where(np.arange(len(names)) < straight, 1.0, size)  # of curvatures, and twists
     stiff = np.abs(np.diag(matrix)) / unit**2
+    plate = kind.straight == 3
     stiffest = stiff.reshape(2, 3).max(axis=1).repeat(3) if plate else stiff.max()
     scale = unit * np.sqrt(stiffest)
     values, ways = np.linalg.eigh(matrix / np.outer(scale, scale))
@@ -315,13 +332,68 @@ def beam_properties(matrix: NDArray, loads: NDArray) -> dict[str, Any]:
     }
 
 
+def solid_properties(matrix: NDArray, loads: NDArray) -> dict[str, Any]:
+    """Variables of a solid, from its stiffness (6, 6), Pa, and mean stress (6,)."""
+    eased = compliance(matrix)
+    own = np.diag(eased)
+    first, across = PAIRS.T
+    return {
+        "stiffness": (("load", "strain"), matrix, {"units": "Pa"}),
+        "mean_load": ("load", loads, {"units": "Pa"}),
+        "modulus": ("direction", modulus(own[:3]), {"units": "Pa"}),
+        "poissons_ratio": ("pair", -eased[across, first] / own[first], {"units": "1"}),
+        "shear_modulus": ("plane", modulus(own[3:]), {"units": "Pa"}),
+    }
+
+
+class Equivalent(NamedTuple):
+    """An equivalent plate, beam or solid.
+
+    Attributes
+    ----------
+    names : of its mean strains, of which the first `straight` have no unit.
+    density : unit
+    """
+
+    frame: Callable[[LinearizedCell], tuple[NDArray, float]]
+    stiffness: Callable[[LinearizedCell, CellEnergy, NDArray], tuple[NDArray, NDArray]]
+    properties: Callable[[NDArray, NDArray], dict[str, Any]]
+    names: list[str]
+    straight: int
+    density: str
+    coordinates: dict[str, Any]
+
+
+KINDS = {
+    1: Equivalent(
+        _beam_frame, _beam, beam_properties, list(BEAM), 1, "kg/m", {"load": list(BEAM)},
+    ),
+    2: Equivalent(
+        _plate_frame, _plate, plate_properties,
+        [f"{of} {name}" for of in ("strain", "curvature") for name in STRAINS], 3, "kg/m2",
+        {
+            "load": list(STRAINS), "direction": ["x", "y"],
+            "angle": ("angle", ANGLES, {"units": "degrees"}),
+        },
+    ),
+    3: Equivalent(
+        _solid_frame, _solid, solid_properties, [f"strain {name}" for name in SOLID], 6, "kg/m3",
+        {
+            "load": list(SOLID), "direction": ["x", "y", "z"], "plane": list(SOLID[3:]),
+            "pair": ["".join("xyz"[k] for k in pair) for pair in PAIRS],
+        },
+    ),
+}  # fmt: skip
+"""What is equivalent to a sheet, by the number of its periods."""
+
+
 def compliance(stiffness: NDArray) -> NDArray[np.float64]:
-    """Inverse (3, 3), with `BOUNDLESS` for a strain that costs no energy; nan if several do not."""
+    """Inverse (n, n), with `BOUNDLESS` for a strain that costs no energy; nan if several do not."""
     values, ways = np.linalg.eigh(stiffness)
     size = np.abs(values)
     soft = size <= SOFT * size.max()
     if soft.sum() > 1:
-        return np.full((3, 3), np.nan)
+        return np.full_like(stiffness, np.nan)
     ways[:, soft] *= np.abs(ways[:, soft]) > NOISE
     return (ways / np.where(soft, 1.0 / BOUNDLESS, values)) @ ways.T
 
