@@ -5,6 +5,9 @@ import pytest
 from test_bands_of_solids import ABOUT_B, HEIGHT, MODELS, PERIODS, SIDE, honeycomb, layers
 
 import foldyn as fd
+from foldyn.errors import InputError
+from foldyn.sweeps.measure import asked
+from foldyn.sweeps.measures import MEASURES
 
 SOLID = [*PERIODS.tolist(), [0.0, 0.0, HEIGHT]]
 NUMBERS = ("xx", "yy", "zz", "yz", "xz", "xy")
@@ -72,3 +75,12 @@ def test_the_numbers_of_a_solid_are_stored(tmp_path):
     again = fd.load(tmp_path / "solid.nc")
     np.testing.assert_array_equal(again.stiffness, found.stiffness)
     assert again.density.units == "kg/m3"
+    for text, own in (
+        ("poissons_ratio[xz]", found.poissons_ratio.sel(pair="xz")),
+        ("shear_modulus[yz]", found.shear_modulus.sel(plane="yz")),
+        ("coupling[xx,zz]", found.stiffness[0, 2]), ("modulus[z]", found.modulus[2]),
+    ):  # fmt: skip
+        assert asked(text, MEASURES).of(found, cell.case, {}) == own
+    for text, reason in (("shear_modulus", "by plane"), ("poissons_ratio[x]", "choose one of xy")):
+        with pytest.raises(InputError, match=reason):
+            asked(text, MEASURES).of(found, cell.case, {})

@@ -187,13 +187,13 @@ def beside(
     }
 
     def values(case: Case) -> dict[str, float]:
-        near, shared = found.beside(case), {}
+        with said_of(", ".join(measures)):
+            near, shared = found.beside(case), {}
         return {text: one.number(near, case, shared) for text, one in measures.items()}
 
     if not measures:
         return {}
-    with said_of(", ".join(measures)):
-        return differenced(design, values, [STEP])
+    return differenced(design, values, [STEP])
 
 
 @contextmanager

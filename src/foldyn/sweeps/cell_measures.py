@@ -79,40 +79,54 @@ def _unstable_bands(result: xr.Dataset, case: Case) -> int:
 
 
 def _property(name: str, result: xr.Dataset, case: Case, **labels: str) -> float:
-    """A number of the equivalent plate or beam, by its labels."""
+    """A number of the equivalent plate, beam or solid, by its labels; the last counts for more."""
     own = "stiffness" if name == "coupling" and "stiffness" in result else name
     if own not in result:
-        raise InputError(f"this cell has none; it has {', '.join(map(str, result.data_vars))}")
-    at = {"direction" if dim == AXIS else dim: label for dim, label in labels.items()}
-    if "load" in at:
-        at.setdefault("strain", at["load"])
+        known = ", ".join(one for one in (*PROPERTIES, "stiffness") if one in result)
+        raise InputError(f"this cell has none; it has {known}")
+    dims, given = result[own].dims, [*labels.values()]
+    if (dims and not given) or len(given) > len(dims):
+        raise InputError(f"this cell has it by {' and '.join(map(str, dims)) or 'no label'}")
+    at = dict(zip(dims, given + given[-1:] * (len(dims) - len(given)), strict=True))
     for dim, label in at.items():
-        choice(dim, label, result[dim].values.tolist())
+        choice(str(dim), label, result[dim].values.tolist())
     return float(result[own].sel(at))
 
 
 PROPERTIES = {
     name: Measure(
-        name, (EFFECTIVE,), partial(_property, name), units, doc, takes=takes, needs=len(takes[:1])
+        name,
+        (EFFECTIVE,),
+        partial(_property, name),
+        units,
+        doc,
+        takes=takes,
+        needs=len(takes[:1]) * (takes != ("plane",)),
     )
     for takes, rows in {
+        ("pair",): (
+            ("poissons_ratio", "1", "Poisson's ratio along an axis, of a solid xy, xz, yx, ..."),
+        ),
         (AXIS,): (
-            ("poissons_ratio", "1", "Poisson's ratio under forces along an axis of the sheet"),
             ("bending_poissons_ratio", "1", "Poisson's ratio of bending along an axis"),
-            ("modulus", "N/m", "modulus of stretching along an axis of the sheet"),
+            ("modulus", "", "modulus of stretching along an axis of the sheet or solid"),
             ("bending_modulus", "N m", "modulus of bending along an axis of the sheet"),
         ),
         ("load", "strain"): (
             ("membrane", "N/m", "membrane stiffness of the sheet"),
             ("bending", "N m", "bending stiffness of the sheet"),
-            ("coupling", "", "forces per curvature of the sheet, or stiffness of the chain"),
+            ("coupling", "", "forces per curvature of the sheet, or stiffness of others"),
         ),
+        ("plane",): (("shear_modulus", "", "shear modulus of the sheet, or solid in a plane"),),
         (): (
-            ("shear_modulus", "N/m", "shear modulus of the sheet"),
             ("twisting_modulus", "N m", "moment of twist of the sheet per unit of twist"),
             ("axial_stiffness", "N", "EA of the chain"),
             ("torsional_stiffness", "N m2", "GJ of the chain"),
-            ("density", "", "mass per area of the sheet, or per length of the chain"),
+            (
+                "density",
+                "",
+                "mass per area of the sheet, length of the chain, or volume of the solid",
+            ),
         ),
     }.items()
     for name, units, doc in rows
