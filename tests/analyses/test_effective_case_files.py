@@ -94,7 +94,8 @@ def test_sweeps_measure_properties(tmp_path):
     found = fd.read_case(path).run()
     assert float(swept.coupling_stretch_twist[0]) == float(found.stretch_twist)
     for measure, reason in (
-        ("poissons_ratio[x]", "it has coupling, axial_stiffness"), ("coupling[xx]", "choose one of stretch, twist"),
+        ("poissons_ratio[x]", "it has coupling, axial_stiffness"),
+        ("coupling[xx]", "choose one of stretch, twist"),
     ):  # fmt: skip
         with pytest.raises(InputError, match=reason):
             asked(measure, MEASURES).of(found, fd.case_of(found), {})

@@ -80,9 +80,10 @@ def _unstable_bands(result: xr.Dataset, case: Case) -> int:
 
 def _property(name: str, result: xr.Dataset, case: Case, **labels: str) -> float:
     """A number of the equivalent plate, beam or solid, by its labels; the last counts for more."""
-    own = "stiffness" if name == "coupling" and "stiffness" in result else name
+    variable = {"coupling": "stiffness"} if "stiffness" in result else {}
+    own = variable.get(name, name)
     if own not in result:
-        known = ", ".join(one for one in (*PROPERTIES, "stiffness") if one in result)
+        known = ", ".join(one for one in PROPERTIES if variable.get(one, one) in result)
         raise InputError(f"this cell has none; it has {known}")
     dims, given = result[own].dims, [*labels.values()]
     if (dims and not given) or len(given) > len(dims):
