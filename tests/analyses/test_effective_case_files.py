@@ -114,3 +114,44 @@ def test_supports_in_the_file_are_refused(tmp_path):
     text = SHEET + '[[supports]]\nnodes = [0]\naxes = "z"\n'
     with pytest.raises(InputError, match="has supports or clamped edges"):
         fd.read_case(written(tmp_path, text)).run()
+
+
+VARY = 'vary = { "pattern.dihedral" = [80, 100] }\n'
+
+
+def test_several_states_are_those_of_their_cells(tmp_path):
+    found = fd.read_case(written(tmp_path, SHEET + VARY)).run()
+    assert found.sizes["state"] == 2
+    assert found["state"].attrs == {
+        "key": "pattern.dihedral", "long_name": "dihedral", "units": "degrees",
+    }  # fmt: skip
+    alone = fd.read_case(written(tmp_path, SHEET)).run()
+    for name in ("membrane", "poissons_ratio", "shear_modulus", "modulus_along"):
+        np.testing.assert_array_equal(found[name][1], alone[name])
+        assert found[name].dims == ("state", *alone[name].dims)
+    fd.save(found, tmp_path / "states.nc")
+    stored = fd.load(tmp_path / "states.nc")
+    np.testing.assert_array_equal(stored.bending, found.bending)
+    with pytest.raises(InputError, match="needs a single state"):
+        asked("modulus[x]", MEASURES).of(found, fd.case_of(found), {})
+
+
+@pytest.mark.matrix
+def test_a_page_of_several_states(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    assert main(["effective", str(written(tmp_path, SHEET + VARY)), "--figures", "png"]) == 0
+    assert "2 states" in capsys.readouterr().out
+    page = (tmp_path / "cell-effective" / "report.html").read_text("utf-8")
+    assert "Properties in each state" in page
+    assert (tmp_path / "cell-effective" / "effective.png").exists()
+
+
+@pytest.mark.matrix
+def test_the_mean_force_grows_with_the_stiffness_of_its_states(tmp_path):
+    few = SHEET.replace("[model]\n", '[model]\nkind = "bars_and_hinges"\nfold_law = "linear"\n')
+    few += 'stretch = [1.0, 1.0]\nvary = { "analysis.stretch[0]" = "0.9999:1.0001:3" }\n'
+    with pytest.warns(fd.errors.FoldynWarning, match="mean forces"):
+        found = fd.read_case(written(tmp_path, few)).run()
+    slope = np.diff(found.mean_force.sel(load=["xx", "yy"]).values[::2], axis=0)[0] / 2e-4
+    stiffness = found.membrane.sel(load=["xx", "yy"], strain="xx").values[1]
+    np.testing.assert_allclose(slope, stiffness, rtol=1e-3)

@@ -24,11 +24,9 @@ from foldyn.analyses.cells import (
     CellState,
     cell_states,
     coordinate,
-    one_key,
 )
-from foldyn.analyses.ranges import Varied
 from foldyn.analyses.sections import Count, Text, whole_number
-from foldyn.arguments import Check, Placed
+from foldyn.arguments import Check
 from foldyn.cases import Case
 from foldyn.errors import InputError, renamed
 from foldyn.linear import UnitCell, attenuation, band_gaps, bands, damped_bands
@@ -66,8 +64,6 @@ class BandsSection(CellSection):
     attenuation : int, optional
         Number of frequencies of an attenuation spectrum, along legs of the path that follow one
         period.
-    vary : mapping, optional
-        Several states: one key of the file, and its values or range.
     """
 
     path: Text | None = None
@@ -75,7 +71,6 @@ class BandsSection(CellSection):
     count: Count = 6
     zone: Annotated[int | None, Check(whole_number, least=2, most=MOST_ZONE)] = None
     attenuation: Annotated[int | None, Check(whole_number, most=MOST_LEVELS)] = None
-    vary: Annotated[Varied | None, Placed(one_key, given=Mapping[str, Any])] = None
     check_model: bool = True
 
 

@@ -14,7 +14,7 @@ from foldyn.analyses.casefile import CaseFile
 from foldyn.analyses.ranges import Varied, varied
 from foldyn.analyses.sections import AnalysisSection, Positive
 from foldyn.analyses.vibration import About, Secant, VibrationSchema, about
-from foldyn.arguments import Check
+from foldyn.arguments import Check, Placed
 from foldyn.cases import Case, State
 from foldyn.cases.loads import Actuate
 from foldyn.cases.units import unit_of
@@ -188,6 +188,8 @@ class CellSection(AnalysisSection):
         Turn (degrees) from cell to cell of a tube in equilibrium.
     periods : int or sequence of int, optional
         Periods of the pattern, by number, along which it repeats; all by default.
+    vary : mapping, optional
+        Several states: one key of the file, and its values or range.
     """
 
     like = (modes, UnitCell)
@@ -203,6 +205,7 @@ class CellSection(AnalysisSection):
     vectors: Any = None
     screw: Annotated[Screw | None, TableOf(Screw)] = None
     tolerance: Positive = 1e-6
+    vary: Annotated[Varied | None, Placed(one_key, given=Mapping[str, Any])] = None
 
 
 class CellSchema(VibrationSchema):

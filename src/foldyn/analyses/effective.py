@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,11 +10,14 @@ import xarray
 
 from foldyn import plots
 from foldyn.analyses.bars import bar, bar_closed
-from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute
-from foldyn.analyses.cells import CellSchema, CellSection, cell_states
+from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, counted
+from foldyn.analyses.cells import CellSchema, CellSection, cell_states, coordinate
+from foldyn.analyses.ranges import Varied
+from foldyn.cases import Case
 from foldyn.linear import effective
 from foldyn.report.album import Album, ByRule
 from foldyn.report.sections import Heading, Section, Table, Text, cell
+from foldyn.results.dataset import result_dataset
 from foldyn.tables import Section as FileSection
 
 MATRICES = {
@@ -60,18 +63,26 @@ class EffectiveAnalysis(Analysis):
 
     def prepare(self, case_file: CaseFile, mass: str, changes: Mapping[str, Any]) -> Compute:
         """See `Analysis`."""
-        (state,) = cell_states(case_file, mass, {**self.arguments, **changes, "vary": None})
+        states = cell_states(case_file, mass, {**self.arguments, **changes})
 
         def compute(progress: bool, begun: Begun) -> xarray.Dataset:
-            with state.placed(), bar_closed(bar(progress, bar_format="stiffness")):
-                result = effective(state.cell, **state.arguments())
-            begun()
-            return result
+            found = []
+            with bar_closed(bar(progress, total=len(states), desc="states")) as reached:
+                for state in states:
+                    with state.placed():
+                        found.append(effective(state.cell, **state.arguments()))
+                    begun()
+                    reached.update()
+            vary = states[0].varied
+            return found[0] if vary is None else _joined(case_file.case(mass), vary, found)
 
         return compute
 
     def line(self, name: str, result: xarray.Dataset) -> str:
         """Main numbers."""
+        if "state" in result.dims:
+            seconds = result.attrs["wall_seconds"]
+            return f"  {counted(result.sizes['state'], 'state')}, {seconds:.1f} s"
         shown = ("modulus", "poissons_ratio", "axial_stiffness", "torsional_stiffness")
         numbers = [
             f"{name.replace('_', ' ')} {_listed(result[name])}" for name in shown if name in result
@@ -83,13 +94,19 @@ class EffectiveAnalysis(Analysis):
         """See `Analysis`."""
         (first, result), *_ = results.items()
         yield from album.structure(case_file.case(first), "A cell with its nodes.")
-        if "angle" in result.coords:
-            yield Heading("Directions")
+        several = "state" in result.dims
+        if several or "angle" in result.coords:
+            yield Heading("States" if several else "Directions")
             yield from album.figure(
-                "effective", "Moduli of stretching and bending along directions in the sheet.",
+                "effective", "Properties in each state." if several else
+                "Moduli of stretching and bending along directions in the sheet.",
                 lambda: plots.plot_effective(result),
             )  # fmt: skip
         yield Heading("The numbers")
+        if several:
+            yield _by_state(result)
+            yield Text(MEANING)
+            return
         for name in (one for one in MATRICES if one in result):
             strains, values = result["strain"].values.tolist(), result[name].values
             row, column = (np.sqrt(np.abs(np.diag(result[one].values))) for one in MATRICES[name])
@@ -103,6 +120,39 @@ class EffectiveAnalysis(Analysis):
         ]
         yield Table(["property", "value", "unit"], others, f"{case_file.path.name}: properties")
         yield Text(MEANING)
+
+
+def _joined(case: Case, vary: Varied, found: Sequence[xarray.Dataset]) -> xarray.Dataset:
+    """Properties in all states as one result."""
+    first, own = found[0], result_dataset("effective", case, {}, {}, {})
+    values = {
+        str(name): (
+            ("state", *one.dims),
+            np.stack([each[name].values for each in found]),
+            one.attrs,
+        )
+        for name, one in first.data_vars.items()
+        if name not in own
+    }
+    along: dict[str, Any] = {
+        str(name): one.variable for name, one in first.coords.items() if name not in own.coords
+    }
+    facts = {
+        "residual": max(one.attrs["residual"] for one in found),
+        "wall_seconds": sum(one.attrs["wall_seconds"] for one in found),
+    }
+    return result_dataset("effective", case, values, along | {"state": coordinate(vary)}, facts)
+
+
+def _by_state(result: xarray.Dataset) -> Table:
+    """The short variables, a row for each state."""
+    shown = [str(name) for name in plots.EFFECTIVE if name in result]
+    rows = [
+        [cell(float(state)), *(_listed(result[name].sel(state=state)) for name in shown)]
+        for state in result["state"].values
+    ]
+    units = [f"{name.replace('_', ' ')} ({result[name].units})" for name in shown]
+    return Table([result["state"].attrs["long_name"], *units], rows, "Properties in each state")
 
 
 def _listed(values: xarray.DataArray) -> str:

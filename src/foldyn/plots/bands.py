@@ -140,26 +140,36 @@ def _along(bands: xr.Dataset) -> tuple[np.ndarray, str]:
     raise InputError(": its phases lie on no path; use cell.path, or plot_iso_frequency", "bands")
 
 
+EFFECTIVE = (
+    "poissons_ratio", "bending_poissons_ratio", "modulus", "bending_modulus", "shear_modulus",
+    "axial_stiffness", "torsional_stiffness", "stretch_twist", "mean_force", "mean_load",
+)  # fmt: skip
+"""Effective properties that are drawn and listed by state."""
+
+
 def plot_effective(effective: xr.Dataset, *, title: str = "") -> Figure:
-    """Draw moduli of stretching and bending along all directions in a sheet.
+    """Draw moduli of stretching and bending along all directions in a sheet, or all its states.
 
     Parameters
     ----------
     effective : xarray.Dataset
-        A result of `foldyn.effective` for a sheet.
+        A result of `foldyn.effective` for a sheet, or of a case file with several states.
     title : str
         Title of the figure.
 
     Returns
     -------
     matplotlib.figure.Figure
-        A polar diagram of each, with the angle from the axis x.
+        A polar diagram of each, with the angle from the axis x; of several states, what is in
+        `EFFECTIVE` against the varied key.
 
     Raises
     ------
     InputError
         Not such a result.
     """
+    if "state" in getattr(effective, "dims", ()):
+        return _draw_states(effective, title)
     if "modulus_along" not in getattr(effective, "data_vars", ()):
         raise InputError(": give what foldyn.effective returns for a sheet", "effective")
     figure = style.new_figure(7.2, 3.8, title)
@@ -170,4 +180,26 @@ def plot_effective(effective: xr.Dataset, *, title: str = "") -> Figure:
         axes.plot(np.append(angle, angle + np.pi), np.tile(values, 2), color=style.BLUE, lw=1.4)
         axes.set_title(f"{text} ({values.attrs['units']})", fontsize="medium")
         axes.set_rlabel_position(90.0)
+    return figure
+
+
+def _draw_states(effective: xr.Dataset, title: str) -> Figure:
+    """Draw the short variables against the states, each in its axes."""
+    shown = [name for name in EFFECTIVE if name in effective]
+    state, rows = effective["state"], -(-len(shown) // 2)
+    figure = style.new_figure(7.2, 2.2 * rows + 0.3, title)
+    for k, (name, axes) in enumerate(zip(shown, figure.subplots(rows, 2).flat, strict=False)):
+        own = effective[name].transpose("state", ...)
+        labels = own[own.dims[1]].values if own.ndim > 1 else [""]
+        for label, values in zip(labels, own.values.reshape(len(state), -1).T, strict=True):
+            axes.plot(state.values, values, lw=1.4, label=label)
+        unit = "" if own.attrs["units"] == "1" else f" ({own.attrs['units']})"
+        words = name.replace("poissons", "Poisson's").replace("_", " ")
+        axes.set_title(f"{words}{unit}", fontsize="medium")
+        if own.ndim > 1:
+            axes.legend(fontsize="small")
+        if k >= len(shown) - 2:
+            axes.set_xlabel(state.attrs["long_name"])
+    for axes in figure.axes[len(shown) :]:
+        axes.set_axis_off()
     return figure

@@ -80,6 +80,7 @@ def _unstable_bands(result: xr.Dataset, case: Case) -> int:
 
 def _property(name: str, result: xr.Dataset, case: Case, **labels: str) -> float:
     """A number of the equivalent plate, beam or solid, by its labels; the last counts for more."""
+    _one_state(result)
     variable = {"coupling": "stiffness"} if "stiffness" in result else {}
     own = variable.get(name, name)
     if own not in result:
