@@ -18,6 +18,8 @@ from __future__ import annotations
 import ctypes
 import re
 import weakref
+from collections import deque
+from contextlib import suppress
 from functools import cache
 from importlib.metadata import PackageNotFoundError, files
 from typing import Any
@@ -47,21 +49,20 @@ class Pattern:
     def __init__(self, matrix: sparse.csc_array) -> None:
         self._indptr, self._indices = matrix.indptr, matrix.indices
         self.size, count = matrix.shape[0], len(matrix.indices)
-        # PARDISO needs all diagonal entries: missing ones are zeros, behind the entries
+        # PARDISO needs all diagonal entries: missing ones are zeros, before the entries
         diagonal = np.arange(self.size)
         row = np.r_[matrix.indices, diagonal]
         column = np.r_[np.repeat(diagonal, np.diff(matrix.indptr)), diagonal]
-        number = np.r_[np.arange(1, count + 1), 0 * diagonal]
+        number = np.r_[np.arange(1, count + 1), 0 * diagonal]  # of an entry, from 1
         # the upper triangle by rows is the lower one by columns
         whole = sparse.csc_array((number, (row, column)), matrix.shape)
         self.lower = sparse.tril(whole, format="csc")
-        self._take = self.lower.data - 1
         self.first = self.lower.indptr.astype(np.int32) + np.int32(1)
         self.column = self.lower.indices.astype(np.int32) + np.int32(1)
 
     def values(self, matrix: sparse.csc_array) -> NDArray:
         """Entries of the upper triangle."""
-        return np.r_[matrix.data, 0.0][self._take]
+        return np.r_[0.0, matrix.data][self.lower.data]
 
     def fits(self, matrix: sparse.csc_array) -> bool:
         """Whether a matrix has this pattern."""
@@ -75,9 +76,7 @@ class _Memory:
     def __init__(self, pattern: Pattern) -> None:
         self.pattern = pattern
         self._handle, self.parameters = np.zeros(64, np.int64), np.zeros(64, np.int32)
-        self.parameters[OWN_VALUES] = 1
-        self.parameters[ORDERING] = NESTED_DISSECTION
-        self.parameters[PERTURBATION] = SMALL
+        self.parameters[[OWN_VALUES, ORDERING, PERTURBATION]] = 1, NESTED_DISSECTION, SMALL
         self.parameters[REPRODUCIBLE] = library().MKL_Get_Max_Threads()
         end = weakref.finalize(self, _call, RELEASE, self._handle, self.parameters, pattern, _NONE)
         end.atexit = False  # the process frees all memory at its end
@@ -97,9 +96,7 @@ class _Memory:
 class Pardiso:
     """Factorizes symmetric matrices; keeps the analysis of the last pattern."""
 
-    def __init__(self) -> None:
-        self._spare: list[_Memory] = []
-        self._pattern: Pattern | None = None
+    _pattern: Pattern | None = None
 
     def __call__(self, matrix: sparse.csc_array) -> PardisoFactors:
         """Factorize a matrix (n, n).
@@ -112,7 +109,7 @@ class Pardiso:
             There is no memory for the factors.
         """
         if self._pattern is None or not self._pattern.fits(matrix):
-            self._pattern, self._spare = Pattern(matrix), []
+            self._pattern, self._spare = Pattern(matrix), deque[_Memory](maxlen=1)
         values = self._pattern.values(finite(matrix))
         if self._spare:
             memory = self._spare.pop()
@@ -123,7 +120,7 @@ class Pardiso:
         if memory.parameters[REPLACED]:
             raise SingularTangentError("the tangent is singular")
         factors = PardisoFactors(memory, values)
-        weakref.finalize(factors, _hand_back, self._spare, memory).atexit = False
+        weakref.finalize(factors, self._spare.append, memory).atexit = False
         return factors
 
 
@@ -149,17 +146,18 @@ class PardisoFactors(Factorization):
 class Rslab:
     """Factorizes symmetric matrices by rslab; keeps the analysis of the last pattern."""
 
-    def __init__(self) -> None:
-        self._pattern: Pattern | None = None
+    _pattern: Pattern | None = None
 
     def __call__(self, matrix: sparse.csc_array) -> RslabFactors:
         """Factorize a matrix (n, n); `SingularTangentError` if it is singular or not finite."""
         from rslab import analyze
 
         if self._pattern is None or not self._pattern.fits(matrix):
-            self._pattern, threads = Pattern(matrix), int(config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
-            lower = self._pattern.lower.astype(float)
-            self._analysis = analyze(lower, path="ldlt", threads=threads)
+            self._pattern = Pattern(matrix)
+            threads = int(config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
+            self._analysis = analyze(
+                self._pattern.lower.astype(float), path="ldlt", threads=threads
+            )
         try:
             return RslabFactors(self._analysis.factor(self._pattern.values(finite(matrix))))
         except RuntimeError as error:  # "matrix is numerically rank-deficient"
@@ -174,18 +172,11 @@ class RslabFactors(Factorization):
 
     def solve(self, b: NDArray) -> NDArray:
         """Solution x of A x = b, (n,) or (n, k)."""
-        b = np.asarray(b, float)
-        return (self._factors.solve if b.ndim == 1 else self._factors.solve_many)(b)
+        return self._factors.solve_many(np.asarray(b, float).reshape(len(b), -1)).reshape(b.shape)
 
     def negative(self) -> int:
         """Number of negative eigenvalues."""
         return self._factors.inertia[1]
-
-
-def _hand_back(spare: list[_Memory], memory: _Memory) -> None:
-    """Keep the memory of released factors for the next factors."""
-    if not spare:
-        spare.append(memory)
 
 
 def _call(
@@ -211,16 +202,10 @@ def _reference(value: Any) -> Any:
 @cache
 def library() -> Any:
     """The loaded library; None if it is missing or cannot be loaded."""
-    try:
-        listed = files("mkl") or []
-    except PackageNotFoundError:
-        return None
-    for file in listed:
-        if LIBRARY.fullmatch(file.name):
-            try:
+    with suppress(PackageNotFoundError, OSError):
+        for file in files("mkl") or []:
+            if LIBRARY.fullmatch(file.name):
                 loaded = ctypes.CDLL(str(file.locate()))
-            except OSError:
-                continue
-            loaded.MKL_CBWR_Set(SAME_BITS)  # refused if MKL is already in use, which is harmless
-            return loaded
+                loaded.MKL_CBWR_Set(SAME_BITS)  # refused if MKL is already in use, harmlessly
+                return loaded
     return None

@@ -6,9 +6,10 @@ import math
 import platform
 import sys
 from collections.abc import Callable, Mapping
+from functools import partial
 from importlib.util import find_spec
 from time import perf_counter
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from scipy import sparse
 
@@ -25,7 +26,7 @@ class Backend(NamedTuple):
 
     make: Callable[[], Factorizer]  # makes a factorizer, best used for matrices of one pattern
     package: str  # that provides the solver, as pip calls it
-    found: Callable[[], bool]  # whether that package is installed
+    found: Callable[[], Any]  # that package, if it is installed
     wheels: bool  # whether there are wheels of it for this machine
     worthwhile: int  # number of rows above which the solver is worth its overhead
     band: float  # number of operations up to which a band factorization is faster
@@ -36,12 +37,8 @@ class Backend(NamedTuple):
 _MKL = platform.machine() in ("x86_64", "AMD64") and sys.platform in ("linux", "win32")
 SOLVERS: Mapping[str, Backend] = {
     "superlu": Backend(lambda: SuperLU, "scipy", lambda: True, True, 0, 8e9, 1.0, 1.0),
-    "rslab": Backend(
-        Rslab, "rslab", lambda: find_spec("rslab") is not None, True, 3_000, 2e9, 0.3, 0.17
-    ),
-    "pardiso": Backend(
-        Pardiso, "foldyn[mkl]", lambda: library() is not None, _MKL, 3_000, 2e9, 0.3, 0.14
-    ),
+    "rslab": Backend(Rslab, "rslab", partial(find_spec, "rslab"), True, 3_000, 2e9, 0.3, 0.19),
+    "pardiso": Backend(Pardiso, "foldyn[mkl]", library, _MKL, 3_000, 2e9, 0.3, 0.14),
 }
 
 
@@ -58,8 +55,7 @@ def factorizer(name: str, size: int) -> tuple[str, Factorizer]:
         *_, best = (SOLVERS[key] for key in fit if key == name or SOLVERS[key].wheels)
         return name, _timed(SOLVERS[name], best)
     if not SOLVERS[name].found():
-        package = SOLVERS[name].package
-        raise InputError(f"solver = {name!r}: pip install \"{package}\", or choose 'superlu'")
+        raise InputError(f"solver = {name!r}: needs pip install {SOLVERS[name].package!r}")
     return name, SOLVERS[name].make()
 
 
@@ -77,10 +73,7 @@ def _timed(used: Backend, best: Backend) -> Factorizer:
         factors = factorize(matrix)
         _lost[0] += (perf_counter() - begun) * (1.0 - best.time / used.time)
         if before <= SAVED < _lost[0]:
-            NOTICE.tell(
-                f'pip install "{best.package}" would have saved about {_lost[0]:.0f} s so far: it '
-                "factorizes large matrices faster (docs/statics.md#linear-solvers)"
-            )
+            NOTICE.tell(f'pip install "{best.package}" would have saved {_lost[0]:.0f} s so far')
         return factors
 
     return factorize if best is used else timed
