@@ -16,6 +16,7 @@ threads.
 from __future__ import annotations
 
 import ctypes
+import os
 import re
 import weakref
 from collections import deque
@@ -25,12 +26,12 @@ from importlib.metadata import PackageNotFoundError, files
 from typing import Any
 
 import numpy as np
-from numba import config
 from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.algebra.superlu import Factorization, SingularTangentError, finite
 from foldyn.errors import ComputationError
+from foldyn.threads import processors
 
 LIBRARY = re.compile(r"(lib)?mkl_rt(\.\d+)*\.(so|dll)(\.\d+)*")
 SAME_BITS = 2  # MKL_CBWR_AUTO: the same arithmetic in every run on one machine
@@ -154,10 +155,9 @@ class Rslab:
 
         if self._pattern is None or not self._pattern.fits(matrix):
             self._pattern = Pattern(matrix)
-            threads = int(config.NUMBA_NUM_THREADS)  # type: ignore[attr-defined]
-            self._analysis = analyze(
-                self._pattern.lower.astype(float), path="ldlt", threads=threads
-            )
+            threads = int(os.environ.get("NUMBA_NUM_THREADS", processors()))
+            lower = self._pattern.lower.astype(float)
+            self._analysis = analyze(lower, path="ldlt", threads=threads)
         try:
             return RslabFactors(self._analysis.factor(self._pattern.values(finite(matrix))))
         except RuntimeError as error:  # "matrix is numerically rank-deficient"
