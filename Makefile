@@ -1,5 +1,5 @@
 # Foldyn: `make demo` and `make test` set up all that they need in .venv.
-# They ask for python3 (3.11 to 3.13) with its venv module, and make; nothing else.
+# They ask for python3 (3.11 to 3.14) with its venv module, and make; nothing else.
 
 PYTHON ?= python3
 VENV   := .venv
@@ -36,10 +36,10 @@ help:  ## list what can be made
 # ------------------------------------------------------------------------------ set-up
 $(BIN)/python:
 	@command -v $(PYTHON) >/dev/null 2>&1 || { \
-	  echo 'make: no "$(PYTHON)" found. Install Python 3.11 to 3.13 (Debian, Ubuntu:' \
+	  echo 'make: no "$(PYTHON)" found. Install Python 3.11 to 3.14 (Debian, Ubuntu:' \
 	       'apt install python3 python3-venv), or name one: make PYTHON=python3.12' >&2; exit 1; }
-	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] < (3, 14))' || { \
-	  echo "make: Foldyn needs Python 3.11 to 3.13, and $(PYTHON) is" \
+	@$(PYTHON) -c 'import sys; sys.exit(not (3, 11) <= sys.version_info[:2] < (3, 15))' || { \
+	  echo "make: Foldyn needs Python 3.11 to 3.14, and $(PYTHON) is" \
 	       "$$($(PYTHON) -V 2>&1 | cut -d' ' -f2). Name another: make PYTHON=python3.12" >&2; exit 1; }
 	@$(PYTHON) -c 'import venv, ensurepip' 2>/dev/null || { \
 	  echo 'make: $(PYTHON) has no venv module. Install it (Debian, Ubuntu:' \
@@ -83,11 +83,14 @@ test-oldest: $(BIN)/python  ## run the tests of compiling, laws and results with
 	@NUMBA_CACHE_DIR=$(OLDEST)/kernels PYTHONPATH=src $(OLDEST)/bin/python -m pytest -q \
 	  -p no:cacheprovider --disable-warnings $(WORKERS) $(OLDEST_TESTS)
 
-lint: $(STAMP)  ## ruff, pyright and the layers contract
+lint: $(STAMP)  ## ruff, pyright, the layers contract, and files that other programs read
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/pyright
 	$(BIN)/lint-imports
+	$(BIN)/check-jsonschema --builtin-schema vendor.citation-file-format CITATION.cff
+	$(BIN)/check-jsonschema --builtin-schema vendor.github-workflows .github/workflows/*.yml
+	$(BIN)/check-jsonschema --builtin-schema vendor.readthedocs .readthedocs.yaml
 
 format: $(STAMP)  ## put the code in order
 	$(BIN)/ruff check --fix .
@@ -97,7 +100,7 @@ docs: $(STAMP)  ## build the documentation; every warning is an error
 	$(BIN)/python -m sphinx -W --keep-going -n -q -b html docs docs/_build/html
 	@echo 'The first page: docs/_build/html/index.html'
 
-wheel-check: $(STAMP)  ## build the wheel, install it into an empty environment, run a shipped case
+wheel-check: $(STAMP)  ## build and check sdist and wheel, install the latter into an empty environment, run a shipped case
 	.ci/wheel-check $(BIN)/python
 
 clean:  ## remove .venv and all that was built

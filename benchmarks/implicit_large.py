@@ -94,6 +94,7 @@ def main() -> None:
     parser.add_argument("cells", type=int, nargs="?", default=100)
     parser.add_argument("--steps", type=int, default=8, help="of the motion")
     parser.add_argument("--rounds", type=int, default=3, help="bare factorizations")
+    parser.add_argument("--solver", default="auto", help="of the step and the bare ones")
     parser.add_argument("--others", action="store_true", help="the bare one by other solvers too")
     parser.add_argument("--only-step", action="store_true", help="neither statics nor modes")
     given = parser.parse_args()
@@ -113,7 +114,7 @@ def main() -> None:
     real = module.factorizer
 
     def keeping(name: str, size: int) -> Any:
-        told, factorize = real(name, size)
+        told, factorize = real(given.solver, size)
 
         def kept(matrix: Any) -> Any:
             clock.matrix = matrix
@@ -125,12 +126,12 @@ def main() -> None:
     case = sheet(given.cells)
     step, each = moving(case, given.steps, clock)
     module.factorizer = real
-    solver = factorizer("auto", clock.matrix.shape[0])[0]
+    solver = factorizer(given.solver, clock.matrix.shape[0])[0]
     print("\n".join(f"- {line}" for line in machine.describe(None)))
     print(f"- {case.structure.nodes.size:,} dofs, {solver}\n")
     print("| | s of processor time | of bare ones | peak GiB |\n|---|---|---|---|")
     gc.collect()
-    unit, first = bare(clock.matrix, given.rounds)
+    unit, first = bare(clock.matrix, given.rounds, solver)
     tell("bare factorization and solution", unit, unit)
     tell("the same with the order", first, unit)
     if given.others:

@@ -350,9 +350,3 @@ def test_the_example_of_the_readme_is_short_moves_and_saves(tmp_path, monkeypatc
     assert float(abs(trajectory.displacement).max()) > 1e-3
     (saved,) = tmp_path.glob("*.nc")
     np.testing.assert_array_equal(fd.load(saved).displacement, trajectory.displacement)
-
-
-def test_the_files_that_the_readme_names_exist():
-    targets = re.findall(r"\]\(([^)#]+)\)", (DOCS.parent / "README.md").read_text("utf-8"))
-    local = [target for target in targets if "://" not in target]
-    assert [target for target in local if not (DOCS.parent / target).exists()] == []

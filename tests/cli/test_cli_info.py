@@ -29,9 +29,10 @@ def test_info(workplace) -> None:
     assert any(line.startswith("kernels of rk4: ") for line in lines)
     (parts,) = [line for line in lines if line.startswith("optional parts: ")]
     assert parts.startswith("optional parts: ffmpeg for MP4 animations, ")
-    (solver,) = [line for line in lines if line.startswith("linear solver")]
+    free, solver = [line for line in lines if line.startswith("linear solver")]
+    assert free.endswith("rslab, found")
     found = fd.statics.SOLVERS["pardiso"].found()
-    assert solver.endswith("pardiso, found" if found else "missing: pip install mkl")
+    assert solver.endswith("pardiso, found" if found else "missing: pip install foldyn[mkl]")
     methods = (*fd.statics.METHODS, *RESPONSES)
     for name in (*fd.patterns.GENERATORS, *FORMATS, *MASS_RULES, *methods):
         assert name in told.out

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 from scipy import sparse
 from sheets import compression
 
-from foldyn.algebra import pardiso
+from foldyn.algebra import pardiso, solvers
 from foldyn.algebra.reduction import Reduction
 from foldyn.algebra.solvers import factorizer
-from foldyn.algebra.superlu import SingularTangentError
+from foldyn.algebra.superlu import SingularTangentError, SuperLU
 from foldyn.errors import InputError
+from foldyn.notice import NOTICE
 from foldyn.statics import SOLVERS, OrigamiProblem, Settings, Solver, trace
 
 PRESENT = [name for name, backend in SOLVERS.items() if backend.found()]
@@ -106,15 +109,52 @@ def test_the_same_bits_again():
     np.testing.assert_array_equal(found[0], found[2])
 
 
+def without(monkeypatch, *names):
+    """Let packages of solvers be missing."""
+    for name in names:
+        monkeypatch.setitem(SOLVERS, name, SOLVERS[name]._replace(found=lambda: False))
+
+
 def test_choice_of_the_backend(monkeypatch):
-    """Without its library nothing but SuperLU is taken, and the message says what to install."""
+    """The last that is installed is taken, and the message says what to install."""
     assert factorizer("auto", 300)[0] == factorizer("superlu", 10**6)[0] == "superlu"
-    best = [name for name in PRESENT if SOLVERS[name].worthwhile <= 10**6][-1]
-    assert factorizer("auto", 10**6)[0] == best
-    monkeypatch.setitem(SOLVERS, "pardiso", SOLVERS["pardiso"]._replace(found=lambda: False))
-    assert factorizer("auto", 10**6)[0] == "superlu"
-    with pytest.raises(InputError, match="needs the package mkl"):
+    assert factorizer("auto", 10**6)[0] == PRESENT[-1]
+    without(monkeypatch, "pardiso")
+    assert factorizer("auto", 10**6)[0] == "rslab"
+    with pytest.raises(InputError, match=r"'pardiso': needs pip install 'foldyn\[mkl\]'"):
         factorizer("pardiso", 10)
+    without(monkeypatch, "rslab")
+    assert factorizer("auto", 10**6)[0] == "superlu"
+
+
+@pytest.mark.parametrize(("used", "mkl", "best"), [
+    ("superlu", True, "pardiso"), ("rslab", True, "pardiso"), ("superlu", False, "rslab"),
+])  # fmt: skip
+def test_a_package_that_would_save_time_is_named_once(monkeypatch, used, mkl, best):
+    """After ten seconds that it would have saved, where there are wheels of it."""
+    told, names = [], list(SOLVERS)
+    monkeypatch.setattr(solvers, "perf_counter", itertools.count(0.0, 4.0).__next__)
+    monkeypatch.setattr(solvers, "_lost", [0.0])
+    monkeypatch.setattr(NOTICE, "tell", told.append)
+    without(monkeypatch, *names[names.index(used) + 1 :])
+    monkeypatch.setitem(SOLVERS, "pardiso", SOLVERS["pardiso"]._replace(wheels=mkl))
+    name, factorize = factorizer("auto", 10**6)
+    assert name == used
+    share = 1.0 - SOLVERS[best].time / SOLVERS[used].time
+    for _ in range(int(10.0 / (4.0 * share))):  # each takes 4 s
+        factorize(symmetric(20, 0))
+    assert not told
+    for _ in range(5):
+        factorizer("auto", 10**6)[1](symmetric(20, 0))
+    assert len(told) == 1
+    assert told[0].startswith(f'pip install "{SOLVERS[best].package}" would have saved 1')
+
+
+def test_nothing_is_named_where_the_best_solver_is_taken(monkeypatch):
+    without(monkeypatch, "pardiso")
+    monkeypatch.setitem(SOLVERS, "pardiso", SOLVERS["pardiso"]._replace(wheels=False))
+    assert isinstance(factorizer("auto", 10**6)[1], pardiso.Rslab)
+    assert factorizer("superlu", 10**6)[1] is SuperLU
 
 
 def test_reduction_follows_the_pattern():

@@ -57,7 +57,7 @@ def case():
         ({"case": STUCK}, "nothing can move"),
         ({"case": IDLE}, "nothing grows along the path"),
         ({"case": specimen()}, "got Structure, give a Case"),
-        ({"settings": Settings(solver="umfpack")}, "choose one of auto, superlu, pardiso"),
+        ({"settings": Settings(solver="umfpack")}, "choose one of auto, superlu, rslab, pardiso"),
     ],
 )
 def test_bad_arguments(case, arguments, message):

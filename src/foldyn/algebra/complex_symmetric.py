@@ -9,11 +9,10 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.linalg import lapack
 
-from foldyn.algebra.superlu import SingularTangentError, Solution, factorize
+from foldyn.algebra.superlu import PIVOT, SingularTangentError, Solution, factorize
 from foldyn.algebra.woodbury import Updated
 
 LOST = 1e-3  # relative rounding error above which a resonance lacks damping
-PIVOT = 0.01  # least pivot on the diagonal, relative to the largest entry in the column
 BESIDE = 64.0  # damping that is added to A, in rounding errors
 # relative change of the solution at which refinement stops, and largest number of rounds
 REFINED, ROUNDS = 1e-12, 4

@@ -268,6 +268,11 @@ def _gap(pencil: Pencil, values: NDArray, count: int) -> tuple[int, float]:
     """
     apart = np.diff(values)
     clear = apart > GAP * (np.abs(values[:-1]) + np.abs(values[1:])) + SHIFT * pencil.scale * 1e-3
+    return gap_near(values, clear, count)
+
+
+def gap_near(values: NDArray, clear: NDArray, count: int) -> tuple[int, float]:
+    """Number of values (m,) below the clear gap (m - 1,) near number `count`, and its middle."""
     gaps = np.flatnonzero(clear) + 1
     if not len(gaps):
         return 0, 0.0

@@ -21,6 +21,7 @@ from scipy import sparse
 from scipy.linalg import LinAlgError, eigh
 from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
 
+from foldyn.algebra.eigen import gap_near
 from foldyn.algebra.superlu import Factorization, Factorizer, SingularTangentError
 from foldyn.errors import ComputationError
 
@@ -190,10 +191,4 @@ def _gap(values: NDArray, count: int) -> tuple[int, float]:
         return 0, 0.0
     if len(values) <= count:
         return len(values), BEYOND * float(values[-1])
-    apart = np.abs(np.diff(values)) > GAP * np.abs(values[1:])
-    gaps = np.flatnonzero(apart) + 1
-    if not len(gaps):
-        return 0, 0.0
-    behind = gaps[gaps >= count]
-    at = int(behind[0]) if len(behind) else int(gaps[-1])
-    return at, 0.5 * float(values[at - 1] + values[at])
+    return gap_near(values, np.abs(np.diff(values)) > GAP * np.abs(values[1:]), count)

@@ -1,22 +1,26 @@
-"""Factorization by PARDISO, from Intel's Math Kernel Library, for large structures.
+"""Factorization of large structures by PARDISO, from Intel's Math Kernel Library, or by rslab.
 
-The matrix is passed as real symmetric indefinite (type -2), upper triangle by rows. This is as
-fast as the factorization of a definite matrix, and also counts the eigenvalues by sign. Pivots stay
-within blocks of the diagonal (Bunch and Kaufman), so only the count is known: critical points are
-then located by bisection on the count.
+The matrix is passed as symmetric indefinite (for PARDISO type -2), upper triangle by rows. This is
+as fast as the factorization of a definite matrix, and also counts the eigenvalues by sign. Pivots
+stay within blocks of the diagonal (Bunch and Kaufman), so only the count is known: critical points
+are then located by bisection on the count.
 
 Nested dissection and the symbolic factorization take a third of the time of the numeric one. They
 depend only on the sparsity pattern. As long as it stays the same, they are done once, and once more
 for each further set of factors that is alive at the same time. Parameters are those of `iparm` in
 the Developer Reference of oneMKL, counted from 0. The package mkl has no Python interface; its
-libraries are called through their C interface.
+libraries are called through their C interface. rslab's results have the same bits for any number of
+threads.
 """
 
 from __future__ import annotations
 
 import ctypes
+import os
 import re
 import weakref
+from collections import deque
+from contextlib import suppress
 from functools import cache
 from importlib.metadata import PackageNotFoundError, files
 from typing import Any
@@ -25,8 +29,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 
-from foldyn.algebra.superlu import Factorization, SingularTangentError
+from foldyn.algebra.superlu import Factorization, SingularTangentError, finite
 from foldyn.errors import ComputationError
+from foldyn.threads import processors
 
 LIBRARY = re.compile(r"(lib)?mkl_rt(\.\d+)*\.(so|dll)(\.\d+)*")
 SAME_BITS = 2  # MKL_CBWR_AUTO: the same arithmetic in every run on one machine
@@ -39,33 +44,26 @@ NO_MEMORY = {-2, -9}
 _NONE = np.zeros(1)
 
 
-class _Pattern:
+class Pattern:
     """Sparsity pattern of a symmetric matrix, with its upper triangle in PARDISO's format."""
 
     def __init__(self, matrix: sparse.csc_array) -> None:
         self._indptr, self._indices = matrix.indptr, matrix.indices
-        size, count = matrix.shape[0], len(matrix.indices)
-        # a symmetric matrix stored by columns is the same if read by rows
-        row = np.repeat(np.arange(size), np.diff(matrix.indptr))
-        kept = np.flatnonzero(matrix.indices >= row)
-        # PARDISO needs all diagonal entries: missing entries are appended as zeros
-        there = np.zeros(size, bool)
-        there[row[matrix.indices == row]] = True
-        none = np.flatnonzero(~there)
-        row = np.r_[row[kept], none]
-        column = np.r_[matrix.indices[kept], none]
-        take = np.r_[kept, np.full(len(none), count)]
-        if len(none) or not matrix.has_sorted_indices:
-            order = np.lexsort((column, row))
-            row, column, take = row[order], column[order], take[order]
-        self._take, self._pad, self.size = take, len(none) > 0, size
-        self.first = np.searchsorted(row, np.arange(size + 1)).astype(np.int32) + np.int32(1)
-        self.column = column.astype(np.int32) + np.int32(1)
+        self.size, count = matrix.shape[0], len(matrix.indices)
+        # PARDISO needs all diagonal entries: missing ones are zeros, before the entries
+        diagonal = np.arange(self.size)
+        row = np.r_[matrix.indices, diagonal]
+        column = np.r_[np.repeat(diagonal, np.diff(matrix.indptr)), diagonal]
+        number = np.r_[np.arange(1, count + 1), 0 * diagonal]  # of an entry, from 1
+        # the upper triangle by rows is the lower one by columns
+        whole = sparse.csc_array((number, (row, column)), matrix.shape)
+        self.lower = sparse.tril(whole, format="csc")
+        self.first = self.lower.indptr.astype(np.int32) + np.int32(1)
+        self.column = self.lower.indices.astype(np.int32) + np.int32(1)
 
     def values(self, matrix: sparse.csc_array) -> NDArray:
         """Entries of the upper triangle."""
-        data = np.r_[matrix.data, 0.0] if self._pad else matrix.data
-        return data[self._take].astype(float, copy=False)
+        return np.r_[0.0, matrix.data][self.lower.data]
 
     def fits(self, matrix: sparse.csc_array) -> bool:
         """Whether a matrix has this pattern."""
@@ -76,12 +74,10 @@ class _Pattern:
 class _Memory:
     """PARDISO's memory for one matrix at a time, with its analysis of a pattern."""
 
-    def __init__(self, pattern: _Pattern) -> None:
+    def __init__(self, pattern: Pattern) -> None:
         self.pattern = pattern
         self._handle, self.parameters = np.zeros(64, np.int64), np.zeros(64, np.int32)
-        self.parameters[OWN_VALUES] = 1
-        self.parameters[ORDERING] = NESTED_DISSECTION
-        self.parameters[PERTURBATION] = SMALL
+        self.parameters[[OWN_VALUES, ORDERING, PERTURBATION]] = 1, NESTED_DISSECTION, SMALL
         self.parameters[REPRODUCIBLE] = library().MKL_Get_Max_Threads()
         end = weakref.finalize(self, _call, RELEASE, self._handle, self.parameters, pattern, _NONE)
         end.atexit = False  # the process frees all memory at its end
@@ -101,9 +97,7 @@ class _Memory:
 class Pardiso:
     """Factorizes symmetric matrices; keeps the analysis of the last pattern."""
 
-    def __init__(self) -> None:
-        self._spare: list[_Memory] = []
-        self._pattern: _Pattern | None = None
+    _pattern: Pattern | None = None
 
     def __call__(self, matrix: sparse.csc_array) -> PardisoFactors:
         """Factorize a matrix (n, n).
@@ -115,11 +109,9 @@ class Pardiso:
         ComputationError
             There is no memory for the factors.
         """
-        if not np.isfinite(matrix.data).all():
-            raise SingularTangentError("the tangent is not finite")
         if self._pattern is None or not self._pattern.fits(matrix):
-            self._pattern, self._spare = _Pattern(matrix), []
-        values = self._pattern.values(matrix)
+            self._pattern, self._spare = Pattern(matrix), deque[_Memory](maxlen=1)
+        values = self._pattern.values(finite(matrix))
         if self._spare:
             memory = self._spare.pop()
         else:
@@ -129,7 +121,7 @@ class Pardiso:
         if memory.parameters[REPLACED]:
             raise SingularTangentError("the tangent is singular")
         factors = PardisoFactors(memory, values)
-        weakref.finalize(factors, _hand_back, self._spare, memory).atexit = False
+        weakref.finalize(factors, self._spare.append, memory).atexit = False
         return factors
 
 
@@ -152,14 +144,43 @@ class PardisoFactors(Factorization):
         return self._negative
 
 
-def _hand_back(spare: list[_Memory], memory: _Memory) -> None:
-    """Keep the memory of released factors for the next factors."""
-    if not spare:
-        spare.append(memory)
+class Rslab:
+    """Factorizes symmetric matrices by rslab; keeps the analysis of the last pattern."""
+
+    _pattern: Pattern | None = None
+
+    def __call__(self, matrix: sparse.csc_array) -> RslabFactors:
+        """Factorize a matrix (n, n); `SingularTangentError` if it is singular or not finite."""
+        from rslab import analyze
+
+        if self._pattern is None or not self._pattern.fits(matrix):
+            self._pattern = Pattern(matrix)
+            threads = int(os.environ.get("NUMBA_NUM_THREADS", processors()))
+            lower = self._pattern.lower.astype(float)
+            self._analysis = analyze(lower, path="ldlt", threads=threads)
+        try:
+            return RslabFactors(self._analysis.factor(self._pattern.values(finite(matrix))))
+        except RuntimeError as error:  # "matrix is numerically rank-deficient"
+            raise SingularTangentError("the tangent is singular") from error
+
+
+class RslabFactors(Factorization):
+    """Factors by rslab."""
+
+    def __init__(self, factors: Any) -> None:
+        self._factors = factors
+
+    def solve(self, b: NDArray) -> NDArray:
+        """Solution x of A x = b, (n,) or (n, k)."""
+        return self._factors.solve_many(np.asarray(b, float).reshape(len(b), -1)).reshape(b.shape)
+
+    def negative(self) -> int:
+        """Number of negative eigenvalues."""
+        return self._factors.inertia[1]
 
 
 def _call(
-    phase: int, handle: NDArray, parameters: NDArray, pattern: _Pattern, values: NDArray,
+    phase: int, handle: NDArray, parameters: NDArray, pattern: Pattern, values: NDArray,
     b: NDArray = _NONE, x: NDArray = _NONE,
 ) -> int:  # fmt: skip
     """Call PARDISO; return the error code, 0 if there is no error."""
@@ -181,16 +202,10 @@ def _reference(value: Any) -> Any:
 @cache
 def library() -> Any:
     """The loaded library; None if it is missing or cannot be loaded."""
-    try:
-        listed = files("mkl") or []
-    except PackageNotFoundError:
-        return None
-    for file in listed:
-        if LIBRARY.fullmatch(file.name):
-            try:
+    with suppress(PackageNotFoundError, OSError):
+        for file in files("mkl") or []:
+            if LIBRARY.fullmatch(file.name):
                 loaded = ctypes.CDLL(str(file.locate()))
-            except OSError:
-                continue
-            loaded.MKL_CBWR_Set(SAME_BITS)  # refused if MKL is already in use, which is harmless
-            return loaded
+                loaded.MKL_CBWR_Set(SAME_BITS)  # refused if MKL is already in use, harmlessly
+                return loaded
     return None

@@ -4,8 +4,8 @@ The tangent of a structure is symmetric, but indefinite beyond a critical point.
 P A P' = L D L' has as many negative pivots as A has negative eigenvalues (Sylvester's law of
 inertia), so one factorization gives both the step and the stability.
 
-SciPy's SuperLU is always available. PARDISO, which is faster on large structures, is an optional
-package; `solvers` chooses among the installed ones.
+SciPy's SuperLU takes small structures, rslab large ones, or PARDISO, an optional package that is
+faster still; `solvers` chooses.
 """
 
 from __future__ import annotations
@@ -49,19 +49,24 @@ class Factorization(Solution, Protocol):
 Factorizer = Callable[[sparse.csc_array], Factorization]
 
 
+def finite(matrix: sparse.csc_array) -> sparse.csc_array:
+    """Refuse a matrix with entries that are not finite."""
+    if not np.isfinite(matrix.data).all():
+        raise SingularTangentError("the tangent is not finite")
+    return matrix
+
+
 def factorize(matrix: sparse.csc_array, symmetric: bool = True, pivot: float = 0.0) -> Any:
     """Factors by SciPy's SuperLU, with the attributes of SuperLU.
 
     symmetric : keep pivots on the diagonal, except a pivot that is smaller than `pivot` times the
     largest entry of its column.
     """
-    symmetrically = {
-        "permc_spec": "MMD_AT_PLUS_A",
-        "diag_pivot_thresh": pivot,
-        "options": {"SymmetricMode": True},
-    }
+    mode = dict(
+        permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=pivot, options={"SymmetricMode": True}
+    )
     try:
-        return splu(matrix, **(symmetrically if symmetric else {}))
+        return splu(matrix, **(mode if symmetric else {}))
     except RuntimeError as error:  # "Factor is exactly singular"
         raise SingularTangentError("the matrix is singular") from error
 
@@ -70,12 +75,7 @@ class SuperLU:
     """SciPy's SuperLU in symmetric mode, with pivots from the diagonal."""
 
     def __init__(self, matrix: sparse.csc_array) -> None:
-        if not np.isfinite(matrix.data).all():
-            raise SingularTangentError("the tangent is not finite")
-        try:
-            self._lu, self._matrix = factorize(matrix), matrix
-        except SingularTangentError as error:
-            raise SingularTangentError("the tangent is singular") from error
+        self._lu, self._matrix = factorize(finite(matrix)), matrix
 
     def solve(self, b: NDArray) -> NDArray:
         """Solution x of A x = b."""
@@ -100,9 +100,7 @@ PIVOT = 0.01  # least pivot on the diagonal, relative to the largest entry in th
 
 def unsymmetric(matrix: sparse.csc_array) -> Solution:
     """Factorize a nearly symmetric matrix."""
-    if not np.isfinite(matrix.data).all():
-        raise SingularTangentError("the tangent is not finite")
-    return factorize(matrix, pivot=PIVOT)
+    return factorize(finite(matrix), pivot=PIVOT)
 
 
 MOST_DENSE = 3000  # number of dofs up to which all eigenvalues are affordable

@@ -76,7 +76,7 @@ def modes(
     verify : bool
         Whether to verify by a second factorization that no mode was missed. It costs about as much
         as the first; small problems are solved in full and do not need it.
-    solver : {"auto", "superlu", "pardiso"}
+    solver : {"auto", "superlu", "rslab", "pardiso"}
         Backend of the sparse factorization, as in the settings of `trace`.
     check_model : bool
         Whether to compare bars and hinges at rest with superelements, where that takes a few
