@@ -23,20 +23,19 @@ html_title = "Foldyn"
 myst_enable_extensions = ["dollarmath", "deflist"]
 myst_heading_anchors = 3
 
-# Notebooks are scripts. They run here (by nbclient) and nowhere else, so that what they show is what
-# Foldyn computes now; one that raises an error or warns fails the build.
+# Notebooks are scripts. They run here (by nbclient) and nowhere else, so that what they show is
+# what Foldyn computes now; one that raises an error or warns fails the build.
 HERE = Path(__file__).parent
 (HERE / "notebooks").mkdir(exist_ok=True)
 for script in (HERE.parent / "examples" / "notebooks").glob("*.py"):
     made = HERE / "notebooks" / f"{script.stem}.ipynb"
-    notebook = jupytext.read(script)
-    notebook.metadata["kernelspec"] = {"name": "python3", "display_name": "Python 3"}
-    text = jupytext.writes(notebook, "ipynb")
-    if not made.exists() or made.read_text("utf-8") != text:
-        made.write_text(text, "utf-8")
+    if not made.exists() or made.stat().st_mtime < script.stat().st_mtime:
+        notebook = jupytext.read(script)
+        notebook.metadata["kernelspec"] = {"name": "python3", "display_name": "Python 3"}
+        jupytext.write(notebook, made)
 nb_execution_mode = "force"
 nb_execution_raise_on_error = True
-nb_execution_timeout = 120  # s, of a cell
+nb_execution_timeout = 300  # s, of a cell
 nb_output_stderr = "warn"
 
 # docstrings are NumPy style, with single backticks around code

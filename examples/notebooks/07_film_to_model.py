@@ -98,8 +98,8 @@ fd.plots.plot_tracks(tracks, nodes[:2], axis="x", truth=true)
 
 # %%
 warnings.simplefilter("ignore", fd.errors.FoldynWarning)
-time, sight = tracks.time.values, ex.Sight.of(tracks)
-history = ex.TimeHistory(nodes, seen, time=time, sight=sight, sigma=2.3e-5)  # m
+measured = {"nodes": nodes, "time": tracks.time.values, "values": seen}  # s, m
+history = ex.TimeHistory(**measured, sigma=2.3e-5, sight=ex.Sight.of(tracks))
 known = {"sheet.length_scale_ratio": 2.7, "damping.alpha": 14.0}
 guessed = [ex.Parameter(key, 0.8 * value, 0.1, 50.0) for key, value in known.items()]
 fit = fd.fit(folder / "swing.toml", [history], parameters=guessed)
