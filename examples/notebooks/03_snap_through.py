@@ -33,10 +33,7 @@ how = {"first_step": 0.5, "steps": 300, "until": down, "settings": smooth}
 path = fd.trace(case, method="arc_length", **how)
 landscape = fd.landscape(path)
 limit = float(path.load_factor[path.point == "limit"][0])
-print(f"snaps at {limit:.2f} N on each corner")
-landscape
-
-# %%
+print(f"snaps at {limit:.2f} N on each corner, over {landscape.barrier():.3f} J")
 fd.plots.plot_landscape(landscape)
 
 # %% [markdown]

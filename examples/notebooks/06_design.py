@@ -30,7 +30,8 @@ def build(height, twist, thickness):
 until = {"node": 6, "axis": "z", "displacement": -0.036}  # m
 snap = {"method": "arc_length", "first_step": 0.5, "steps": 300, "until": until}
 guess = {"height": 0.06, "twist": 30.0, "thickness": 2.4e-4}  # m, degrees, m
-fd.landscape(fd.trace(build(**guess), **snap))
+before = fd.landscape(fd.trace(build(**guess), **snap))
+print(f"guess: barrier {before.barrier():.3f} J")
 
 # %% [markdown]
 # Measures of the path are objective and constraints. Their derivatives are exact, those

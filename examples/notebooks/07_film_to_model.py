@@ -106,5 +106,5 @@ fit = fd.fit(folder / "swing.toml", [history], parameters=guessed)
 print(fit.quality)
 for key, value in known.items():
     one = fit[key]
-    print(f"{key} {one.value:.2f} ({one.lower:.2f} to {one.upper:.2f}), truth {value}")
+    print(f"{key} {one.value:.3f} ({one.lower:.3f} to {one.upper:.3f}), truth {value}")
     assert abs(one.value / value - 1.0) < 0.02

@@ -21,23 +21,20 @@ fd.read_case(path).case("consistent")
 # cases; by default a sweep takes all processors.
 
 # %%
-grid = fd.sweep(
-    path,
-    {
-        "pattern.dihedral": "25:60:8",  # degrees, eight values
-        "sheet.length_scale_ratio": "1,3,8",  # creases are softer the larger it is
-        "model.mass": "consistent",
-    },
-    measures=["frequency[1]"],
-    processes=1,
-)
+varied = {
+    "pattern.dihedral": "25:60:8",  # degrees, eight values
+    "sheet.length_scale_ratio": "1,3,8",  # creases are softer the larger it is
+    "model.mass": "consistent",
+}
+how = {"measures": ["frequency[1]"], "processes": 1}
+grid = fd.sweep(path, varied, **how)
 lines = {"x": "dihedral", "by": "length_scale_ratio"}
 fd.plots.plot_sweep_lines(grid, "frequency_1", **lines)
 
 # %% [markdown]
 # ## At random
 #
-# Say four numbers are known to some percent only. Forty points are drawn from their
+# Say four numbers are known to some percent only. Points are drawn from their
 # ranges, and a main effect is the mean over all other parameters: which of them should
 # be measured better?
 
@@ -49,7 +46,7 @@ uncertain = {
     "sheet.density": "640:700",  # kg/m3
     "model.mass": "consistent",
 }
-drawn = fd.sweep(path, uncertain, measures=["frequency[1]"], samples=40, processes=1)
+drawn = fd.sweep(path, uncertain, samples=64, method="sobol", **how)
 fd.plots.plot_main_effects(drawn, "frequency_1")
 
 # %% [markdown]
@@ -64,7 +61,7 @@ four_times = {
     "sheet.density": "200,800",
     "model.mass": "consistent",
 }
-found = fd.sweep(path, four_times, measures=["frequency[1]"], processes=1)
+found = fd.sweep(path, four_times, **how)
 found = found.frequency_1.squeeze()
 print(found.values.round(3), "Hz")
 np.testing.assert_allclose(found / found[0, 0], [[1.0, 0.5], [2.0, 1.0]], rtol=1e-6)
