@@ -25,7 +25,8 @@ def test_a_notebook_is_short_listed_and_checks_its_result(path):
     jupytext = pytest.importorskip("jupytext")
     page = (ROOT / "docs" / "notebooks.md").read_text("utf-8")
     assert f"\nnotebooks/{path.stem}\n" in page  # in the list of pages
-    assert f"| [](notebooks/{path.stem}) |" in page
+    assert f"](notebooks/{path.stem}.ipynb) |" in page
+    assert f"](../examples/notebooks/{path.name})" in page
     assert f"<notebooks/{path.stem}.ipynb>" in page
     assert len(path.read_text("utf-8").splitlines()) < 115
     first, *rest = jupytext.read(path).cells
