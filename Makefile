@@ -96,7 +96,7 @@ format: $(STAMP)  ## put the code in order
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
-docs: $(STAMP)  ## build the documentation; every warning is an error
+docs: $(STAMP)  ## build the documentation and run its notebooks; every warning is an error
 	$(BIN)/python -m sphinx -W --keep-going -n -q -b html docs docs/_build/html
 	@echo 'The first page: docs/_build/html/index.html'
 
@@ -104,5 +104,5 @@ wheel-check: $(STAMP)  ## build and check sdist and wheel, install the latter in
 	.ci/wheel-check $(BIN)/python
 
 clean:  ## remove .venv and all that was built
-	rm -rf $(VENV) $(OLDEST) build dist docs/_build demo-results .pytest_cache .ruff_cache .import_linter_cache .hypothesis
+	rm -rf $(VENV) $(OLDEST) build dist docs/_build docs/notebooks demo-results .pytest_cache .ruff_cache .import_linter_cache .hypothesis
 	find src tests -name __pycache__ -type d -prune -exec rm -rf {} +
