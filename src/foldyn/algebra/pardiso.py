@@ -202,10 +202,11 @@ def _reference(value: Any) -> Any:
 @cache
 def library() -> Any:
     """The loaded library; None if it is missing or cannot be loaded."""
-    with suppress(PackageNotFoundError, OSError):
+    with suppress(PackageNotFoundError):
         for file in files("mkl") or []:
-            if LIBRARY.fullmatch(file.name):
-                loaded = ctypes.CDLL(str(file.locate()))
-                loaded.MKL_CBWR_Set(SAME_BITS)  # refused if MKL is already in use, harmlessly
-                return loaded
+            with suppress(OSError):
+                if LIBRARY.fullmatch(file.name):
+                    loaded = ctypes.CDLL(str(file.locate()))
+                    loaded.MKL_CBWR_Set(SAME_BITS)  # refused if MKL is already in use, harmlessly
+                    return loaded
     return None
