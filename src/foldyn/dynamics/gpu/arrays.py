@@ -17,7 +17,7 @@ from foldyn.dynamics.system import PackedCase
 from foldyn.mechanics.constant_damping import DampingMatrix
 from foldyn.mechanics.membranes import Membranes
 from foldyn.mechanics.membranes_term import MembranesTerm
-from foldyn.mechanics.model import BarsHinges
+from foldyn.mechanics.model import OF_BARS, BarsHinges
 from foldyn.mechanics.springs import Springs, SpringsTerm
 from foldyn.mechanics.viscous import Viscous, ViscousTerm, viscous
 
@@ -202,8 +202,7 @@ def _stacked(own: Sequence[Any], same: Sequence[str]) -> Any:
 def _with_force(model: BarsHinges) -> BarsHinges:
     """The model with only those bars that have a law; membranes replace the others."""
     count = int(model.bar_runs[:, 1].max(initial=0))
-    bars = ("bars", "bar_vector", "bar_per_length2", "bar_stiffness")
-    return model._replace(**{name: getattr(model, name)[:count] for name in bars})
+    return model._replace(**{name: getattr(model, name)[:count] for name in OF_BARS})
 
 
 def _codes(runs: NDArray, count: int) -> NDArray:
