@@ -48,10 +48,10 @@ from foldyn.mechanics.contact.candidates import (
     ACROSS_CREASE,
     Sheets,
     Tables,
+    beside_nodes,
     distances,
     panel_nodes,
     shared_nodes,
-    starts,
     tables,
 )
 from foldyn.mechanics.contact.distances import cross, dot, minus, point
@@ -350,24 +350,16 @@ def board_tables(
     own, base = tables(points, np.zeros((0, 4), np.int64)), tables(mesh, hinges)
     first = len(ride.rest) - len(ride.x)
     panels, near, closed = _neighbors(sheets, ride, panel[:first], node[:first])
-    no_panels: list = [[]] * len(ride.x)
-    panels, near = panels + no_panels, near + no_panels
-    d0 = [of[other] for of in near for other in sorted(of)]
+    beside = beside_nodes(panels + [[] for _ in ride.x], near + [{} for _ in ride.x])
     return own._replace(
         edge_nodes=node[own.edges],
-        ranges=own.ranges._replace(
-            own_start=starts(panels),
-            own=np.array([p for of in panels for p in of], np.int64),
-            near_start=starts(near),
-            near=np.array([p for of in near for p in sorted(of)], np.int64),
-            near_d0=np.array(d0, float),
-        ),
+        ranges=own.ranges._replace(**beside),
         hinges=base.hinges + first,
         hinge_row=base.hinge_row,
         hinge_limit=base.hinge_limit * _guarded(base, closed),
         hinge_reach=base.hinge_reach,
         hinge_stiffness=base.hinge_stiffness,
-        farthest=max([own.farthest, *d0]) if sheets.panels else 0.0,
+        farthest=float(beside["near_d0"].max(initial=own.farthest)) if sheets.panels else 0.0,
     )
 
 
