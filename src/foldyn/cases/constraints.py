@@ -161,7 +161,9 @@ class Constraints:
         return sparse.csr_array(basis.T @ matrix @ basis)
 
     def extended(self, size: int) -> sparse.csr_array:
-        """E (m, m), extended to m dofs."""
+        """E (m, m), extended to m dofs; the identity without equations."""
+        if not self:
+            return sparse.csr_array(sparse.eye_array(size))
         more = size - len(self.held)
         if not more:
             return self.basis

@@ -291,7 +291,7 @@ class Equation:
         self.level = 1.0 if driven else 0.0
         total, self.heavy = self.body.size, len(case.free_dofs)
         self._free = np.concatenate([case.free_dofs, self.body.hidden])
-        whole = case.constraints.extended(total) if case.constraints else sparse.eye_array(total)
+        whole = case.constraints.extended(total)
         self.basis = sparse.csr_array(sparse.csc_array(whole)[:, self._free])
         self.size, self.offset = len(self._free), np.zeros(total)
         self.whole: Equation = self

@@ -55,6 +55,7 @@ from foldyn.mechanics.contact.candidates import (
     tables,
 )
 from foldyn.mechanics.contact.distances import cross, dot, minus, point
+from foldyn.mechanics.triangle import normals_of
 
 NOISE = 16.0 * float(np.finfo(float).eps)  # relative rounding error of a normal
 LEVI_CIVITA = np.zeros((3, 3, 3))
@@ -87,10 +88,8 @@ def ride_on(
     points = points.reshape(-1, 3)
     m = len(key)
     share = 1.0 / np.bincount(points.ravel(), minlength=m)[points]
-    a, b, c = (x[triangles[:, i]] for i in range(3))
-    normal = np.cross(b - a, c - a)
-    twice = np.linalg.norm(normal, axis=1)
-    normal /= twice[:, None]
+    (normal, area), (a, b, c) = normals_of(x[triangles]), np.moveaxis(x[triangles], 1, 0)
+    twice = 2.0 * area
     away = middle - a[:, None]
     heights = np.einsum("tci,ti->tc", away, normal)
     # weights from the areas spanned by a point and two nodes
@@ -231,12 +230,10 @@ def put_lightness(ride, lightness, out):
 
 def _frames(ride: Ride, u: NDArray) -> tuple[NDArray, NDArray, NDArray, NDArray]:
     """[e_i x] (t, 3, 3, 3), unit normals (t, 3), |N| (t,) and P (t, 3, 3) of all triangles."""
-    a, b, c = np.moveaxis((ride.x + u[: len(ride.x)])[ride.nodes], 1, 0)
-    normal = np.cross(b - a, c - a)
-    size = np.linalg.norm(normal, axis=1)
-    normal /= size[:, None]
+    corners = (ride.x + u[: len(ride.x)])[ride.nodes]
+    (a, b, c), (normal, area) = np.moveaxis(corners, 1, 0), normals_of(corners)
     across = np.eye(3) - normal[:, :, None] * normal[:, None, :]
-    return _crossing(np.stack([c - b, a - c, b - a], axis=1)), normal, size, across
+    return _crossing(np.stack([c - b, a - c, b - a], axis=1)), normal, 2.0 * area, across
 
 
 def _crossing(e: NDArray) -> NDArray:
@@ -405,9 +402,7 @@ def _guarded(base: Tables, closed: dict[tuple[int, int], float]) -> NDArray[np.f
 
 def _above(ride: Ride) -> NDArray[np.float64]:
     """Height (m,) of the nodes above the points of boards, toward the front, at rest."""
-    a, b, c = np.moveaxis(ride.rest[ride.points], 1, 0)
-    normal = np.cross(b - a, c - a)
-    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    normal, _ = normals_of(ride.rest[ride.points])
     away = ride.x[ride.nodes] - ride.rest[ride.points]
     out = np.zeros(len(ride.rest))
     out[ride.points] = np.einsum("tci,ti->tc", away, normal)
