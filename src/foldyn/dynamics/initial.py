@@ -64,15 +64,13 @@ def initial_state(result: Any, at: int = -1) -> State:
     if not -count <= at < count:
         raise InputError(f" = {at}: the result has samples 0 to {count - 1}", "at")
     sample = result.isel({dimension: at})
+    of_nodes = ("node", "axis")
+    known = {"displacement": of_nodes, "velocity": of_nodes, "memory": ("branch", "variable")}
     state: dict[str, Any] = {
-        name: check_variable(sample, name, ("node", "axis"), place="initial_state: ").to_numpy()
-        for name in ("displacement", "velocity")
-        if name == "displacement" or name in sample
+        name: check_variable(sample, name, dims, place="initial_state: ").to_numpy()
+        for name, dims in known.items()
+        if name in sample
     }
-    if "memory" in sample:
-        state["memory"] = check_variable(
-            sample, "memory", ("branch", "variable"), place="initial_state: "
-        ).to_numpy()
     if "time" not in sample:
         return State(**state)
     continuation = _continuation(sample)

@@ -69,7 +69,7 @@ class CaseArrays:
             _stacked(models, TOPOLOGY)._replace(
                 bars=model.bars.astype(np.int32), hinges=model.hinges.astype(np.int32)
             ),
-            _codes(model.bar_runs, len(model.bars)), _codes(model.hinge_runs, len(model.hinges)),
+            _codes(model.bar_runs), _codes(model.hinge_runs),
             (*membranes, *[_no_panels()] * (MOST_KINDS - len(membranes))),
             springs, dampers, damping,
         )  # fmt: skip
@@ -205,12 +205,9 @@ def _with_force(model: BarsHinges) -> BarsHinges:
     return model._replace(**{name: getattr(model, name)[:count] for name in OF_BARS})
 
 
-def _codes(runs: NDArray, count: int) -> NDArray:
-    """Law code (count,) of each element."""
-    out = np.zeros(count, np.int64)
-    for start, end, code, _ in runs:
-        out[start:end] = code
-    return out
+def _codes(runs: NDArray) -> NDArray:
+    """Law code of each element."""
+    return np.repeat(runs[:, 2], runs[:, 1] - runs[:, 0])
 
 
 def _no_panels() -> Membranes:

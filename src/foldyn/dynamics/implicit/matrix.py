@@ -25,6 +25,7 @@ from foldyn.dynamics.system import PackedCase
 from foldyn.dynamics.ties import Ties, follow_masters, hand_over, masters_of, onto
 from foldyn.jit.compiled import kernel
 from foldyn.jit.intrinsics import flat
+from foldyn.mechanics.block_matrix import places_of
 from foldyn.mechanics.constant_damping import DampingRows
 from foldyn.mechanics.following import following_places, put_following
 from foldyn.mechanics.tangent import Sparsity, block_keys, entry_slots, joined
@@ -267,11 +268,8 @@ class _Sparse:
 def _entries(pattern: Sparsity, free: NDArray, filled: NDArray, ties: Ties) -> _Entries:
     """Entries between free dofs from the `filled` blocks, also through slaves of constraints."""
     dofs = 3 * (len(pattern.indptr) - 1)
-    node = np.repeat(np.arange(dofs // 3), np.diff(pattern.indptr)).astype(np.int64)
-    axis = np.arange(3)
-    row = 3 * node[:, None, None] + axis[:, None] + 0 * axis
-    column = 3 * pattern.indices.astype(np.int64)[:, None, None] + axis[:, None] * 0 + axis
-    row, column = row.ravel(), column.ravel()
+    node = np.repeat(np.arange(dofs // 3), np.diff(pattern.indptr))
+    row, column = places_of(np.column_stack([node, pattern.indices]))
     if not len(ties.slave):
         number = np.full(dofs, -1)
         number[free] = np.arange(len(free))
