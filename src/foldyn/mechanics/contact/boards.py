@@ -120,7 +120,7 @@ def ride_on(
 def carried(ride: Ride, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Points (m,) that depend on the chosen nodes (n,) only."""
     out = np.concatenate([np.ones(len(ride.rest) - len(ride.x), bool), chosen])
-    np.logical_and.at(out, ride.points, chosen[ride.nodes].all(axis=1)[:, None])
+    np.logical_and.at(out, ride.points, chosen[ride.nodes].all(axis=1, keepdims=True))
     return out
 
 
