@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -277,6 +277,14 @@ class Case(Loaded, Damped):
         """Numbers of the contact planes that move, with their histories."""
         planes = enumerate(() if self.contact is None else self.contact.planes)
         return tuple((i, as_history(p.history)) for i, p in planes if p.history is not None)
+
+    def planes_moved(self, shares: Iterable[float]) -> NDArray[np.float64]:
+        """Displacements (q, 3), m, of the contact planes, at the factors of `obstacle_terms`."""
+        planes = () if self.contact is None else self.contact.planes
+        moved = np.zeros((len(planes), 3))
+        for (number, _), share in zip(self.obstacle_terms, shares, strict=True):
+            moved[number] = share * np.array(planes[number].motion)
+        return moved
 
     @property
     def lines(self) -> SpringsTerm | None:

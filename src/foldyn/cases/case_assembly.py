@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.cases.clamped_edges import Straight, held_edges, supported_points
+from foldyn.cases.clamped_edges import between_ends, held_edges, supported_points
 from foldyn.cases.connectors import Dashpot
 from foldyn.cases.constraints import Constraints, equations_of, values_of
 from foldyn.cases.damping import CreaseDamping, Damping, ModalDamping, Rayleigh, StrainDamping
@@ -38,16 +38,24 @@ class Supported:
     @cached_property
     def fixed(self) -> NDArray[np.bool_]:
         """Whether each node is held along each axis, by Fix or Impose, shape (n, 3)."""
-        return read_only(self._straight.held())
+        held = self._stated | self._held
+        for nodes in self.structure.clamped_nodes:
+            held[nodes[1:-1]] |= held[nodes[0]] & held[nodes[-1]]
+        return read_only(held)
 
     @cached_property
     def imposed(self) -> NDArray[np.bool_]:
         """Whether an Impose moves each node along each axis, shape (n, 3)."""
-        return read_only(self._straight.moved(self._stated))
+        moved = self._stated.copy()
+        for nodes in self.structure.clamped_nodes:
+            inner, ends = nodes[1:-1], moved[nodes[0]] | moved[nodes[-1]]
+            moved[inner] |= self._straight[inner] & ends
+        return read_only(moved)
 
     @cached_property
-    def _straight(self) -> Straight:
-        return Straight(self.structure, self._stated | self._held)
+    def _straight(self) -> NDArray[np.bool_]:
+        """Whether mesh points between the ends of clamped edges follow these, shape (n, 3)."""
+        return self.fixed & ~(self._stated | self._held)
 
     @cached_property
     def _stated(self) -> NDArray[np.bool_]:
@@ -150,7 +158,10 @@ class Supported:
         stated : displacements (n, 3) along axes.
         values : displacements along directions, by the place of the support.
         """
-        shape, ties = self._straight.carried(stated), self.constraints
+        shape, ties = stated.copy(), self.constraints
+        for nodes in self.structure.clamped_nodes:
+            inner, between = nodes[1:-1], between_ends(self.structure, nodes[None], stated)[0]
+            shape[inner] = np.where(self._straight[inner], between, stated[inner])
         return ties.moved(shape, values_of(ties.owners, values), place) if ties else shape
 
     @cached_property

@@ -41,7 +41,7 @@ def supported_points(
     stated = np.zeros(len(structure.nodes))
     stated[named] = value
     inner = edges[:, 1:-1].ravel()
-    between = _between(structure, edges, stated[:, None])
+    between = between_ends(structure, edges, stated[:, None])
     return np.concatenate([named, inner]), np.concatenate([value, between.ravel()])
 
 
@@ -146,48 +146,9 @@ def straightened(options: Any, pattern: Pattern, supports: Iterable[Any]) -> dic
     return {"straight": tuple(straight), "guided": slid}
 
 
-def _between(structure: Discretized, edges: NDArray, vector: NDArray) -> NDArray[np.float64]:
+def between_ends(structure: Discretized, edges: NDArray, vector: NDArray) -> NDArray[np.float64]:
     """Values (k, p - 2, ...) at the inner points of edges (k, p), linear between their ends."""
     x = structure.nodes[edges]
     share = np.linalg.norm(x - x[:, :1], axis=2)
     share = (share / share[:, -1:])[:, 1:-1, None]
     return (1.0 - share) * vector[edges[:, :1]] + share * vector[edges[:, -1:]]
-
-
-class Straight:
-    """Mesh points between the ends of a structure's clamped edges.
-
-    Parameters
-    ----------
-    structure : Structure or Shell
-    stated : ndarray of bool, shape (n, 3)
-        Dofs with supports of their own, which remain as they are.
-    """
-
-    def __init__(self, structure: Discretized, stated: NDArray[np.bool_]) -> None:
-        self._structure, self._stated = structure, stated
-
-    def held(self) -> NDArray[np.bool_]:
-        """All supported dofs (n, 3)."""
-        held = self._stated.copy()
-        for nodes in self._structure.clamped_nodes:
-            held[nodes[1:-1]] |= held[nodes[0]] & held[nodes[-1]]
-        return held
-
-    def moved(self, imposed: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Moved dofs (n, 3): imposed dofs, and points of edges with an imposed end."""
-        both, moved = self.held(), imposed.copy()
-        for nodes in self._structure.clamped_nodes:
-            inner = nodes[1:-1]
-            moved[inner] |= (
-                both[inner] & ~self._stated[inner] & (moved[nodes[0]] | moved[nodes[-1]])
-            )
-        return moved
-
-    def carried(self, vector: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Displacements (n, 3), linear between the ends of clamped edges."""
-        out, both = vector.copy(), self.held()
-        for nodes in self._structure.clamped_nodes:
-            inner, between = nodes[1:-1], _between(self._structure, nodes[None], vector)[0]
-            out[inner] = np.where(both[inner] & ~self._stated[inner], between, vector[inner])
-        return out

@@ -8,7 +8,7 @@ unknowns, and keeps matrices symmetric and positive definite.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -119,10 +119,7 @@ class Constraints:
     # ------------------------------------------------------------------ vectors and matrices
     def displacement(self, x: NDArray) -> NDArray:
         """Displacements u = E x for coordinates x (m,) or (m, k)."""
-        if not self:
-            return x
-        count = len(self.held)
-        return np.concatenate([self.basis @ x[:count], x[count:]])
+        return self._times(x, lambda: self.basis)
 
     def coordinates(self, u: NDArray) -> NDArray:
         """Vector x for displacements u (m,): u with each slave replaced by its equation's value."""
@@ -143,17 +140,18 @@ class Constraints:
 
     def force(self, force: NDArray) -> NDArray:
         """E' f for forces f (m,) or (m, k), N."""
-        if not self:
-            return force
-        count = len(self.held)
-        return np.concatenate([self.basis.T @ force[:count], force[count:]])
+        return self._times(force, lambda: self.basis.T)
 
     def largest(self, force: NDArray) -> NDArray:
         """|E|' f: upper bounds, N, of E' f if forces have the absolute values f (m,)."""
+        return self._times(force, lambda: abs(self.basis).T)
+
+    def _times(self, vector: NDArray, matrix: Callable[[], Any]) -> NDArray:
+        """A matrix (3n, 3n) times the nodal part of a vector (m,) or (m, k); the rest is kept."""
         if not self:
-            return force
+            return vector
         count = len(self.held)
-        return np.concatenate([abs(self.basis).T @ force[:count], force[count:]])
+        return np.concatenate([matrix() @ vector[:count], vector[count:]])
 
     def matrix(self, matrix: sparse.csr_array) -> sparse.csr_array:
         """E' K E for a matrix K (m, m)."""
@@ -163,7 +161,9 @@ class Constraints:
         return sparse.csr_array(basis.T @ matrix @ basis)
 
     def extended(self, size: int) -> sparse.csr_array:
-        """E (m, m), extended to m dofs."""
+        """E (m, m), extended to m dofs; the identity without equations."""
+        if not self:
+            return sparse.csr_array(sparse.eye_array(size))
         more = size - len(self.held)
         if not more:
             return self.basis

@@ -12,6 +12,7 @@ from foldyn.cases.case import Case
 from foldyn.cases.constraints import AGREES
 from foldyn.errors import InputError, warn
 from foldyn.mechanics.contact.candidates import NORMAL, POINT
+from foldyn.mechanics.contact.term import ContactTerm
 from foldyn.mechanics.crossings import crossing_panels, pairs_text
 
 STRIDE = 5  # crossing panels are looked for in every fifth state
@@ -44,22 +45,20 @@ def check_contact(case: Case, u: NDArray, moved: NDArray) -> None:
     """
     if case.contact is None:
         return
-    _check_planes(case, u, moved)
+    x = case.contact_term.tables.rest + case.contact_term.points(u)
+    _check_planes(case.contact_term, x, moved)
     if case.contact.panels:
-        _check_panels(case, u)
+        _check_panels(case, u, x)
 
 
-def _check_planes(case: Case, u: NDArray, moved: NDArray) -> None:
+def _check_planes(contact: ContactTerm, x: NDArray, moved: NDArray) -> None:
     """Refuse nodes behind a plane or in it."""
-    assert case.contact is not None
-    contact, tables = case.contact_term, case.contact_term.tables
-    met = tables.meeting
+    tables, met = contact.tables, contact.tables.meeting
     if not len(met):
         return
-    x = (tables.rest + contact.points(u))[met]
     surface, half = contact.nodes[met], 0.5 * tables.node_thickness[met]
     for i, plane in enumerate(tables.planes):
-        height = (x - plane[POINT : POINT + 3] - moved[i]) @ plane[NORMAL : NORMAL + 3]
+        height = (x[met] - plane[POINT : POINT + 3] - moved[i]) @ plane[NORMAL : NORMAL + 3]
         if (height > NEAREST * half).all():
             continue
         worst = int(np.argmin(height / half))
@@ -73,12 +72,10 @@ def _check_planes(case: Case, u: NDArray, moved: NDArray) -> None:
         )
 
 
-def _check_panels(case: Case, u: NDArray) -> None:
+def _check_panels(case: Case, u: NDArray, x: NDArray) -> None:
     """Refuse panels that cross or meet; warn if they overlap at rest."""
     contact = case.contact_term
-    tables = contact.tables
-    x = tables.rest + contact.points(u)
-    pairs = crossing_panels(x, tables.triangles, tables.panel)
+    pairs = crossing_panels(x, contact.tables.triangles, contact.tables.panel)
     pairs = pairs[pairs[:, 0] != pairs[:, 1]]  # a panel has no contact with itself
     if len(pairs):
         raise InputError(

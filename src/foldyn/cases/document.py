@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import dataclasses
 import json
-import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
@@ -29,7 +28,7 @@ from foldyn.cases.loads import LOAD, Load
 from foldyn.cases.masses import MASS
 from foldyn.cases.models import BARS_AND_HINGES, MODELS, SHELL
 from foldyn.cases.supports import SUPPORT
-from foldyn.errors import FoldynWarning, InputError, quietly
+from foldyn.errors import InputError, quietly
 from foldyn.materials import BAR_LAWS, HINGE_LAWS, HingeLaw
 from foldyn.patterns import Boards, Pattern
 from foldyn.structures import Sheet, discretize
@@ -178,27 +177,25 @@ class _Writer:
                 "face_offsets", np.concatenate([[0], np.cumsum(lengths)]).astype(np.int64)
             ),
             "assignments": self.store("assignments", np.array(pattern.assignments, dtype="<U1")),
-            **self._boards(pattern.boards),
             **self._more(pattern),
         }
 
     def _more(self, pattern: Pattern) -> dict[str, Any]:
-        """Further data of a pattern: fold angles, welds, families, periods, custom data."""
+        """Further data of a pattern: boards, fold angles, welds, families, periods, custom data."""
         table: dict[str, Any] = {}
+        for name in ("corners", "thickness") if pattern.boards else ():
+            table[f"board_{name}"] = self.store(f"board_{name}", getattr(pattern.boards, name))
         if not np.isnan(pattern.fold_angles).all():
             table["fold_angles"] = self.store("fold_angles", pattern.fold_angles)
         if len(pattern.welds):
             table["welds"] = self.store("welds", pattern.welds)
-        if pattern.families:
-            table["families"] = [
-                {"name": name, "creases": self.store(f"tables_family{i}_creases", rows)}
-                for i, (name, rows) in enumerate(pattern.families.items())
-            ]
-        if pattern.rim_families:
-            table["rim_families"] = [
-                {"name": name, "edges": self.store(f"tables_rim_family{i}_edges", rows)}
-                for i, (name, rows) in enumerate(pattern.rim_families.items())
-            ]
+        for key, what in (("family", "creases"), ("rim_family", "edges")):
+            plural = key.replace("family", "families")
+            if named := getattr(pattern, plural):
+                table[plural] = [
+                    {"name": name, what: self.store(f"tables_{key}{i}_{what}", rows)}
+                    for i, (name, rows) in enumerate(named.items())
+                ]
         if pattern.periods:
             table["periods"] = [
                 self.store(f"tables_period{k}_vertices", pairs.ravel())
@@ -210,14 +207,6 @@ class _Writer:
             except (TypeError, ValueError):
                 self.obstacles.append("its pattern has custom data that JSON cannot hold")
         return table
-
-    def _boards(self, boards: Boards | None) -> dict[str, Any]:
-        if boards is None:
-            return {}
-        return {
-            "board_corners": self.store("board_corners", boards.corners),
-            "board_thickness": self.store("board_thickness", boards.thickness),
-        }
 
     def _sheet(self, sheet: Sheet) -> dict[str, Any]:
         given = {name: value for name, value in vars(sheet).items() if name != "panels"}
@@ -274,20 +263,15 @@ class _Writer:
         return {"kind": kind, **{k: value for k, value in values.items() if value is not None}}
 
     def _contact(self, contact: Contact) -> dict[str, Any]:
-        planes = []
-        for plane in contact.planes:
-            table = plane.table()
-            history = as_history(plane.history)
-            if history != STEADY:
-                table["history"] = self._history(history, True)
-            planes.append(table)
-        without = {key: value for key, value in contact.table().items() if key != "planes"}
-        return {**without, **({"planes": planes} if planes else {})}
+        table = {key: value for key, value in contact.table().items() if key != "planes"}
+        if contact.planes:
+            table["planes"] = [self._part(plane) for plane in contact.planes]
+        return table
 
     def _part(self, part: Any) -> dict[str, Any]:
         section = part.table()
         for name in filter(lambda key: key.endswith("history"), part.by_key()):
-            history = getattr(part, name)
+            history = as_history(getattr(part, name))
             if history != STEADY or name in part.missing:
                 moves = not isinstance(part, Load) or part.moves
                 section[name] = self._history(history, moves)
@@ -330,9 +314,7 @@ def _read(sections: Mapping[str, Any]) -> Case:
     contact = read(Contact, "", sections["contact"]) if "contact" in sections else None
     air = read(Air, "", sections["air"]) if "air" in sections else None
     structure = _structure(sections)
-    with warnings.catch_warnings(
-        action="ignore", category=FoldynWarning
-    ):  # warnings were issued when the case was first made
+    with quietly():  # warnings were issued when the case was first made
         damping = read(DampingSection, "", sections["damping"]).made()
         return Case(structure, supports, loads, damping, masses, contact, air)
 

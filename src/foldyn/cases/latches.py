@@ -10,9 +10,8 @@ import numpy as np
 from foldyn.arguments import Check, Key
 from foldyn.cases.decode import Part
 from foldyn.cases.loads import PerCrease
-from foldyn.cases.selection import Creases
+from foldyn.cases.selection import Creases, refuse_linear
 from foldyn.cases.stops import check_open_angles, on_hinges
-from foldyn.errors import InputError
 from foldyn.materials.latching import Latching
 from foldyn.structures.discretized import Discretized
 from foldyn.structures.inelastic_hinges import Remembering
@@ -64,11 +63,7 @@ class Latch(Part):
 
     def remembering(self, structure: Discretized, place: str) -> Remembering:
         """The latches as hinges with memory."""
-        if structure.kind == "superelements":
-            raise InputError(
-                f"{place}: superelements are linear, and latches are not; take bars and hinges or "
-                "a shell"
-            )
+        refuse_linear(structure, place, "latches")
         on = on_hinges(self, structure, place)
         folds = structure.body.sheet.fold_hinges().some(on.row)
         hinges = folds._replace(stiffness=on.stiffness, softness=0.0 * on.stiffness)

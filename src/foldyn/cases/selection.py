@@ -63,6 +63,15 @@ def in_range(field: str, given: Any, count: int, what: str) -> NDArray[np.int64]
     return chosen
 
 
+def refuse_linear(structure: Discretized, place: str, what: str) -> None:
+    """Refuse parts that are not linear, such as stops, on superelements."""
+    if structure.kind == "superelements":
+        raise InputError(
+            f"{place}: superelements are linear, and {what} are not; take bars and hinges or a "
+            "shell"
+        )
+
+
 def check_nodes(name: str, nodes: Any) -> str | tuple[int, ...]:
     """Return a node selection as text or tuple of numbers; their range is not checked."""
     if isinstance(nodes, str):

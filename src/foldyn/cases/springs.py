@@ -15,7 +15,7 @@ from foldyn.cases.connectors import NEAR, Connector
 from foldyn.cases.decode import Factor, Part
 from foldyn.cases.directions import Direction, Pairs
 from foldyn.cases.history import CONSTANT, STEADY, History
-from foldyn.cases.selection import Nodes, resolve_nodes
+from foldyn.cases.selection import Nodes, refuse_linear, resolve_nodes
 from foldyn.errors import FoldynWarning, InputError, warn
 from foldyn.mechanics.lines import GROUND, Lines
 from foldyn.mechanics.springs import Springs, SpringsTerm
@@ -321,11 +321,7 @@ class Cable(Elastic):
     def add_to(self, made: Made, place: str) -> None:
         """See `Elastic`."""
         structure = made.structure
-        if structure.kind == "superelements":
-            raise InputError(
-                f"{place}: superelements are linear, and cables, which can be slack, are not; take "
-                "bars and hinges or a shell"
-            )
+        refuse_linear(structure, place, "cables, which can be slack,")
         node, x = self.points(structure, place)
         _refuse_coincident(structure, x, self.nodes, f"{place}.nodes")
         line = float(np.linalg.norm(np.diff(x, axis=0), axis=1).sum())

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from foldyn.arguments import Check, Key
 from foldyn.cases.decode import Part
 from foldyn.cases.loads import PerCrease, check_angles
-from foldyn.cases.selection import Creases, resolve_creases
+from foldyn.cases.selection import Creases, refuse_linear, resolve_creases
 from foldyn.errors import InputError
 from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.jit.context import Context, numbers_at, rows_at
@@ -387,11 +387,7 @@ class Stop(Part):
     @classmethod
     def term(cls, parts: Sequence[tuple[str, Any]], structure: Discretized) -> StopsTerm:
         """See `Part`."""
-        if structure.kind == "superelements":
-            raise InputError(
-                f"{parts[0][0]}: superelements are linear, and stops are not; take bars and hinges "
-                "or a shell"
-            )
+        refuse_linear(structure, parts[0][0], "stops")
         on = [on_hinges(part, structure, place) for place, part in parts]
         stiffness = np.concatenate([one.stiffness for one in on])
         return StopsTerm(_packed(on, stiffness, structure), structure.body.sheet.rows)

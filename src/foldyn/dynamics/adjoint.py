@@ -152,10 +152,16 @@ class Adjoint(ABC):
         substitute(self._mass, by_a, out, self._scratch.line)
         return out
 
-    def _add_acceleration(
-        self, a: NDArray, w: NDArray, by_a: NDArray, by_u: NDArray, by_v: NDArray
+    def _through(
+        self, t: float, q: NDArray, w: NDArray, a: NDArray, weight: NDArray, by_a: NDArray,
+        by_u: NDArray, by_v: NDArray,
     ) -> None:  # fmt: skip
-        """Propagate derivatives for a = -M^-1 b - alpha w to all arguments of a, after `_pull`."""
+        """Propagate derivatives for a = -M^-1 b - alpha w to all arguments of a.
+
+        weight : of b, with which it acts on later states, too.
+        """
+        self._forget()
+        self._pull(*self._whole(t, q, w), weight)
         self._add_supports()
         self._add_mass(self._push(by_a), a, w)
         by_u -= self._product

@@ -58,24 +58,18 @@ class CentralDifferenceAdjoint(Adjoint):
                 )
             self._back(step, self._segment[place], by_u, by_v)
         if first == 0:
-            self._through(self._plan.start, self._begin, by_u, by_v, self._by_a)
+            push = self._push(self._by_a)
+            self._through(self._plan.start, *self._begin, push, self._by_a, by_u, by_v)
             self._by_a[:] = 0.0
 
     def _back(self, step: int, at: Evaluated, by_u: NDArray, by_v: NDArray) -> None:
         """Step backward from the end of one step to its start."""
         half, by_ahead = 0.5 * self._plan.dt, np.zeros_like(by_v)
         by_a = self._by_a + half * by_v
-        self._through(self._plan.start + step * self._plan.dt, at, by_u, by_ahead, by_a)
+        t = self._plan.start + step * self._plan.dt
+        self._through(t, *at, self._push(by_a), by_a, by_u, by_ahead)
         by_v += by_ahead + self._plan.dt * by_u
         self._by_a[:] = half * (by_ahead + by_v)
-
-    def _through(
-        self, t: float, at: Evaluated, by_u: NDArray, by_v: NDArray, by_a: NDArray
-    ) -> None:  # fmt: skip
-        """Propagate derivatives from an acceleration to displacement and velocity."""
-        self._forget()
-        self._pull(*self._whole(t, at.u, at.ahead), self._push(by_a))
-        self._add_acceleration(at.a, at.ahead, by_a, by_u, by_v)
 
     def _taken(
         self, first: int, last: int, u: NDArray, v: NDArray, a: NDArray

@@ -407,13 +407,9 @@ def snapshot(parts: Mapping[str, Any]) -> dict[str, NDArray]:
         Values by the names of their places, for `restore`.
     """
     kept = {}
-    for place in _places(parts):
-        if isinstance(place.value, np.void):
-            kept[place.name] = np.array(
-                [float(place.value[one]) for one in place.value.dtype.names or ()]
-            )
-        else:
-            kept[place.name] = np.array(place.value)
+    for name, _, _, value in _places(parts):
+        record = isinstance(value, np.void)
+        kept[name] = np.array(value.tolist(), float) if record else np.array(value)
     return kept
 
 

@@ -85,7 +85,7 @@ def dampers(case: Case, quasi_static: bool = False) -> list[Term]:
     InputError
         The structure does not list the hinges of a damped crease.
     """
-    body, nodes = case.elastic_body, case.structure.nodes
+    body = case.elastic_body
     pairs, strength = [np.zeros((0, 2), np.int64)], [np.zeros(0)]
     constant = sparse.csr_array((body.size, body.size))
     for place, dashpot in case.dashpots:
@@ -107,7 +107,7 @@ def dampers(case: Case, quasi_static: bool = False) -> list[Term]:
         constant = sparse.csr_array(constant + turns.rows.T @ (turns.rows * own[:, None]))
     ends = np.concatenate(pairs)
     terms: list[Term] = [DampingMatrix(constant)] if constant.nnz else []
-    elements = _elements(case, body, nodes, ends, strength, quasi_static)
+    elements = _elements(case, body, ends, np.concatenate(strength), quasi_static)
     if len(elements.coefficient):
         terms.append(ViscousTerm(elements))
     terms += [] if case.damped_stops is None else [case.damped_stops]
@@ -119,9 +119,8 @@ def dampers(case: Case, quasi_static: bool = False) -> list[Term]:
 
 
 def _elements(
-    case: Case, body: Assembly, nodes: NDArray, pairs: NDArray, strength: list[NDArray],
-    quasi_static: bool,
-) -> Viscous:  # fmt: skip
+    case: Case, body: Assembly, pairs: NDArray, strength: NDArray, quasi_static: bool
+) -> Viscous:
     """Axial dashpots between pairs (p, 2) of nodes, damped creases, and strain damping."""
     damping = case.crease_damping
     if body.sheet.crease_turns is not None:
@@ -134,21 +133,16 @@ def _elements(
     share = 1.0 - hinges.softness * hinges.stiffness
     coefficient = coefficient * np.where(hinges.remembers, share**2 * quasi_static, 1.0)
     damped = coefficient > 0.0
-    axial, along = np.concatenate(strength), nodes[pairs[:, 1]] - nodes[pairs[:, 0]]
-    rows, corners, hidden = hinges.nodes[damped], hinges.corners[damped], hinges.hidden[damped]
-    hidden_turn, turning = hinges.hidden_turn[damped], coefficient[damped]
+    own, nodes = hinges.some(damped), case.structure.nodes
+    along = nodes[pairs[:, 1]] - nodes[pairs[:, 0]]
+    turned = own.nodes, own.corners, own.hidden, own.hidden_turn, coefficient[damped]
+    parts = [(pairs, along, strength, *turned)]
     if beta := case.strain_damping:
         strains = body.strains()
         assert strains is not None  # otherwise the case would have been refused
-        stiff = strains.hinge_stiffness > 0.0
+        stiff, alone = strains.hinge_stiffness > 0.0, strains.bar_stiffness > 0.0
         none = np.full((int(stiff.sum()), 2), NO_DOF)
-        alone = strains.bar_stiffness > 0.0
-        pairs = np.concatenate([pairs, strains.bars[alone]])
-        along = np.concatenate([along, strains.vector[alone]])
-        axial = np.concatenate([axial, beta * strains.bar_stiffness[alone]])
-        rows = np.concatenate([rows, strains.hinges[stiff]])
-        corners = np.concatenate([corners, strains.corners[stiff]])
-        hidden = np.concatenate([hidden, none])
-        hidden_turn = np.concatenate([hidden_turn, np.zeros(none.shape)])
-        turning = np.concatenate([turning, beta * strains.hinge_stiffness[stiff]])
-    return viscous(pairs, along, axial, rows, corners, hidden, hidden_turn, turning)
+        stretched = strains.bars[alone], strains.vector[alone], beta * strains.bar_stiffness[alone]
+        turned = strains.hinges[stiff], strains.corners[stiff], none, np.zeros(none.shape)
+        parts.append((*stretched, *turned, beta * strains.hinge_stiffness[stiff]))
+    return viscous(*map(np.concatenate, zip(*parts, strict=True)))

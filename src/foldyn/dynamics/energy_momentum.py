@@ -18,8 +18,7 @@ includes this residual.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,40 +76,19 @@ class EnergyMomentum(Scheme):
 
     def __init__(self, packed: PackedCase, state: MotionState) -> None:
         super().__init__(packed, state)
-        body, touch = packed.body, None
-        contact = body.find(ContactTerm)
-        if contact is not None:
+        body, equation = packed.body, self.equation
+        self._contact: Any = None  # with contact, its `StepContact`
+        if contact := body.find(ContactTerm):
             kept = body.kept(self.part, ContactTerm)
-            touch = StepContact(contact, kept, packed.system.rows)
-        self._contact, equation = touch, self.equation
+            self._contact = StepContact(contact, kept, packed.system.rows)
         self._terms = terms = MeanForces(body, self.part)
         self._step = Context(
             MeanStep(
                 equation.case.value, terms.context, terms.kernel, terms.drive, terms.powers,
                 self.old, self.new, np.zeros_like(self.new.factor), self.shift, self.out,
-                state.angle, np.zeros((0, 3)) if touch is None else touch.force,
+                state.angle, self._contact.force if self._contact else np.zeros((0, 3)),
             )
         )  # fmt: skip
-        self._before = 0.0  # length of the last step, s
-
-    def begin(self, t: float) -> None:
-        """Make `old` the start of a motion; see `Scheme.begin`."""
-        super().begin(t)
-        self._before = 0.0
-
-    def accept(self, h: float) -> None:
-        """Accept a step h (s); see `Scheme.accept`."""
-        super().accept(h)
-        self._before = h
-
-    def numbers(self) -> list[NDArray]:
-        """Numbers that the next step depends on; see `Scheme.numbers`."""
-        return [*super().numbers(), np.array([self._before])]
-
-    def resume(self, numbers: Sequence[NDArray]) -> None:
-        """Resume from the values that `numbers` returned; see `Scheme.resume`."""
-        super().resume(numbers)
-        self._before = float(numbers[-1][0])
 
     def weights(self, h: float) -> Weights:
         """Weights of the step matrix; see `Scheme.weights`."""
@@ -134,17 +112,14 @@ class EnergyMomentum(Scheme):
 
     def contact_tangent(self, contact: ContactTerm, memory: Memory) -> sparse.csr_array:
         """Derivative of the mean contact force; see `Scheme.contact_tangent`."""
-        assert self._contact is not None
         return self._contact.tangent()
 
     def plane_push(self, before: NDArray, after: NDArray) -> NDArray:
         """Mean friction and normal force of the planes; see `Scheme.plane_push`."""
-        assert self._contact is not None
         return self._contact.push
 
     def rub(self, before: NDArray, after: NDArray) -> NDArray:
         """Mean friction between panels; see `Scheme.rub`."""
-        assert self._contact is not None
         return self._contact.rub
 
     def works(self, h: float) -> tuple[float, float, float]:
@@ -158,7 +133,7 @@ class EnergyMomentum(Scheme):
 
     def change(self, h: float) -> NDArray:
         """Error estimate of a step, from accelerations at midpoints; see `Scheme.change`."""
-        return h**3 / (6.0 * (h + self._before)) * (self.new.a - self.old.a)
+        return h**3 / (6.0 * (h + self._last)) * (self.new.a - self.old.a)
 
 
 @kernel

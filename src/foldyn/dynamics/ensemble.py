@@ -272,18 +272,12 @@ def _integrate(
     return ended
 
 
-def _alike(keys: Iterable[Any], motions: Sequence[Motion]) -> dict[Any, list[tuple[int, Motion]]]:
-    """Numbered motions, grouped by key."""
-    found: dict[Any, list[tuple[int, Motion]]] = {}
-    for (k, motion), key in zip(enumerate(motions), keys, strict=True):
-        found.setdefault(key, []).append((k, motion))
-    return found
-
-
 def _in_lanes(motions: Sequence[Motion], out: Samples, threads: int) -> set[int]:
     """Integrate what lanes support; return indices of unsupported motions and of failures."""
     lanes = motions[0].method.name == METHOD
-    alike = _alike([topology(motion) if lanes else () for motion in motions], motions)
+    alike: dict[Any, list[tuple[int, Motion]]] = {}  # numbered motions by topology
+    for k, motion in enumerate(motions):
+        alike.setdefault(topology(motion) if lanes else (), []).append((k, motion))
     alone = {k for k, _ in alike.pop((), ())}
     groups = [own[k : k + WIDTH] for own in alike.values() for k in range(0, len(own), WIDTH)]
     with ThreadPoolExecutor(threads) as pool:

@@ -227,10 +227,8 @@ class ImplicitAdjoint(Adjoint):
 
     def _back_to_begin(self, start: Reached, by_u: NDArray, by_v: NDArray) -> None:
         """Step backward through a = -M^-1 b - alpha w, the acceleration at the start of a part."""
-        (_, af, _, _), (t, q, w, a) = self._scheme.parameters, start
-        self._forget()
-        self._pull(*self._whole(t, q, w), af * self._z + self._push(self._by_a))
-        self._add_acceleration(a, w, self._by_a, by_u, by_v)
+        weight = self._scheme.parameters.af * self._z + self._push(self._by_a)
+        self._through(*start, weight, self._by_a, by_u, by_v)
         by_v *= self._kinds[0]
         self._by_a[:] = self._z[:] = 0.0
 

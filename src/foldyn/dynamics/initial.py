@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -16,6 +16,7 @@ from foldyn.algebra.superlu import SingularTangentError
 from foldyn.cases import Case, Continuation, Origin, State
 from foldyn.cases.constraints import AGREES, check_tied
 from foldyn.cases.contact_checks import check_contact, check_driven
+from foldyn.cases.directions import AXES
 from foldyn.dynamics.actuation import turn
 from foldyn.dynamics.inertia import moving_energy
 from foldyn.dynamics.modal_damping import about
@@ -31,12 +32,10 @@ from foldyn.results.contents import check_variable
 from foldyn.results.quantities import CONTINUATIONS, ORIGIN
 from foldyn.values import whole
 
-LOOKS = 201  # instants at which the lengths of cables are looked at
-AXES = "xyz"
 MODAL = "modal"  # the method of motions of superelements
 FIRST = 0.15  # ratio of first to largest step, divided by the fifth root of the tolerance
 SLOW_WIND = 0.05  # a wind below this share of the initial speed is negligible
-LOOKS = 501  # number of times at which supports and planes are checked, apart from knots
+LOOKS = 501  # times at which supports, planes and cables are checked, apart from knots
 ZERO = 1e-10  # eigenvalues below this share of the largest stiffness count as zero
 
 
@@ -65,15 +64,13 @@ def initial_state(result: Any, at: int = -1) -> State:
     if not -count <= at < count:
         raise InputError(f" = {at}: the result has samples 0 to {count - 1}", "at")
     sample = result.isel({dimension: at})
+    of_nodes = ("node", "axis")
+    known = {"displacement": of_nodes, "velocity": of_nodes, "memory": ("branch", "variable")}
     state: dict[str, Any] = {
-        name: check_variable(sample, name, ("node", "axis"), place="initial_state: ").to_numpy()
-        for name in ("displacement", "velocity")
-        if name == "displacement" or name in sample
+        name: check_variable(sample, name, dims, place="initial_state: ").to_numpy()
+        for name, dims in known.items()
+        if name in sample
     }
-    if "memory" in sample:
-        state["memory"] = check_variable(
-            sample, "memory", ("branch", "variable"), place="initial_state: "
-        ).to_numpy()
     if "time" not in sample:
         return State(**state)
     continuation = _continuation(sample)
@@ -134,16 +131,8 @@ def check_start(case: Case, initial: State | None) -> tuple[NDArray, NDArray]:
 
 def check_touching(case: Case, u: NDArray, start: float, end: float) -> None:
     """Refuse impossible contact in a motion from displacements u (n, 3) at `start` (s)."""
-    planes = () if case.contact is None else case.contact.planes
-
-    def moved(factors: Iterable[float]) -> NDArray:
-        out = np.zeros((len(planes), 3))
-        for (plane, _), factor in zip(case.obstacle_terms, factors, strict=True):
-            out[plane] = factor * np.array(planes[plane].motion)
-        return out
-
     obstacles = [history for _, history in case.obstacle_terms]
-    check_contact(case, u, moved(float(history(start)) for history in obstacles))
+    check_contact(case, u, case.planes_moved(float(history(start)) for history in obstacles))
     driven = (*case.imposed_terms, *case.base_terms)
     if case.contact is None or not (driven or obstacles):
         return
@@ -161,7 +150,7 @@ def check_touching(case: Case, u: NDArray, start: float, end: float) -> None:
             (
                 f"t = {time:.6g} s",
                 sum((f * s for f, s in zip(along[:, k] - along[:, 0], shapes, strict=True)), u),
-                moved(factors[: len(obstacles), k]),
+                case.planes_moved(factors[: len(obstacles), k]),
             )
             for k, time in enumerate(times)
         ),

@@ -222,9 +222,7 @@ def _applied(case: Case, u: NDArray) -> NDArray:
     force = -body.internal(u)
     for load, _ in _loads(case, u):
         force += load.ravel()
-    change = np.zeros_like(body.sheet.rest_angles)
-    for turn, _ in case.rest_terms:
-        change += turn
+    change = sum((turn for turn, _ in case.rest_terms), np.zeros_like(body.sheet.rest_angles))
     if change.any():
         linear = body.nominal(u)
         force -= linear.folded(linear.sheet.rest_angles + change).internal(u) - linear.internal(u)
@@ -233,10 +231,8 @@ def _applied(case: Case, u: NDArray) -> NDArray:
 
 def _imposed(case: Case) -> NDArray:
     """Displacements (3n,) of supports at factor 1, m."""
-    moved = np.zeros(case.structure.nodes.shape)
-    for shape, _ in (*case.imposed_terms, *case.base_terms):
-        moved += shape
-    return moved.ravel()
+    moves = (*case.imposed_terms, *case.base_terms)
+    return sum((shape for shape, _ in moves), np.zeros(case.structure.nodes.shape)).ravel()
 
 
 def _out_of_balance(case: Case, u: NDArray, start: float) -> bool:

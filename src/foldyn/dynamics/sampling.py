@@ -141,27 +141,14 @@ def _forces_inside(case: Case) -> dict[str, Quantity]:
         assert lines is not None
         return lines.at(lambda history: float(history(time))).pulls(u)
 
-    own = {} if lines is None else {"tension": TENSION._replace(function=pulls)}
-    return own | _contact_quantities(case)
-
-
-def _contact_quantities(case: Case) -> dict[str, Quantity]:
-    """Quantities that are sampled with contact; empty without contact."""
-    if case.contact is None:
-        return {}
-    planes = case.contact.planes
-
     def term_at(time: float) -> ContactTerm:
-        moved = np.zeros((len(planes), 3))
-        for plane, history in case.obstacle_terms:
-            moved[plane] = float(history(time)) * np.array(planes[plane].motion)
+        moved = case.planes_moved(float(history(time)) for _, history in case.obstacle_terms)
         return case.contact_term.displaced(moved)
 
-    def force(u: NDArray, v: NDArray, time: float) -> NDArray:
-        return term_at(time).touch(u)
-
-    def push(u: NDArray, v: NDArray, time: float) -> NDArray:
-        return term_at(time).plane_forces(u)
-
-    functions = {CONTACT_FORCE: force} | ({PLANE_FORCE: push} if planes else {})
-    return {name: CONTACT[name]._replace(function=own) for name, own in functions.items()}
+    own = {} if lines is None else {"tension": TENSION._replace(function=pulls)}
+    functions: dict[str, Any] = {}
+    if case.contact is not None:
+        functions[CONTACT_FORCE] = lambda u, v, time: term_at(time).touch(u)
+        if case.contact.planes:
+            functions[PLANE_FORCE] = lambda u, v, time: term_at(time).plane_forces(u)
+    return own | {name: CONTACT[name]._replace(function=f) for name, f in functions.items()}

@@ -104,9 +104,7 @@ def matrices(case: Case, varying: list[History]) -> Matrices:
     for vector, history in (*case.imposed_terms, *case.base_terms):
         support[: vector.size, varying.index(history)] += vector.ravel()
     free = np.concatenate([case.free_dofs, body.hidden])
-    ties = sparse.eye_array(size, format="csr")
-    if case.constraints:
-        ties = case.constraints.extended(size)
+    ties = case.constraints.extended(size)
     return Matrices(
         stiffness, sparse.csr_array(mass), sparse.csr_array(damping), modal_rows(case).rows,
         free, sparse.csr_array(ties[:, free]), load + heat, turned + heat, stored + warm,

@@ -55,16 +55,27 @@ def _rows(matrix: sparse.csr_array, by: Numbering) -> Rows:
     return Rows(matrix.indptr.astype(np.int64), by.dofs(matrix.indices), matrix.data)
 
 
+def masters_of(free: NDArray, ties: Ties, dofs: int) -> tuple[NDArray, NDArray, NDArray]:
+    """For each dof, its masters, numbered as in `free` (f,), and their coefficients, as in CSR."""
+    number = np.full(dofs, -1)
+    number[free] = np.arange(len(free))
+    dof = np.concatenate([free, np.repeat(ties.slave, np.diff(ties.masters.start))])
+    master = number[np.concatenate([free, ties.masters.dof])]
+    value = np.concatenate([np.ones(len(free)), ties.masters.value])
+    order = np.argsort(dof, kind="stable")
+    start = np.searchsorted(dof[order], np.arange(dofs + 1))
+    return start, master[order], value[order]
+
+
+def onto(free: NDArray, ties: Ties, dofs: int) -> sparse.csr_array:
+    """Map (dofs, f) from the free dofs to all dofs, including the slaves of constraints."""
+    start, master, value = masters_of(free, ties, dofs)
+    return sparse.csr_array((value, master, start), (dofs, len(free)))
+
+
 def reduced(matrix: sparse.csr_array, ties: Ties) -> sparse.csr_array:
     """Reduce a matrix of all dofs (m, m) to the free dofs (f, f)."""
-    size, count = matrix.shape[0], len(ties.free)
-    place = np.full(size, -1)
-    place[ties.free] = np.arange(count)
-    masters = np.repeat(ties.slave, np.diff(ties.masters.start))
-    row = np.concatenate([ties.free, masters])
-    column = np.concatenate([np.arange(count), place[ties.masters.dof]])
-    value = np.concatenate([np.ones(count), ties.masters.value])
-    basis = sparse.csr_array((value, (row, column)), (size, count))
+    basis = onto(ties.free, ties, matrix.shape[0])
     return sparse.csr_array(basis.T @ matrix @ basis)
 
 

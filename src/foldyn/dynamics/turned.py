@@ -71,8 +71,7 @@ def turned(
     last = angle.argmax(axis=0)
     panel = np.arange(len(tri))
     own, theta = turn[last, panel], angle[last, panel]
-    axis = np.stack([own[:, 2, 1], own[:, 0, 2], own[:, 1, 0]], axis=1)
-    axis -= np.stack([own[:, 1, 2], own[:, 2, 0], own[:, 0, 1]], axis=1)
+    axis = (own - own.swapaxes(1, 2))[:, [2, 0, 1], [1, 2, 0]]
     axis /= np.maximum(np.linalg.norm(axis, axis=1, keepdims=True), 1e-300)
     rate = _rates((nodes + displacement)[:, tri], velocity[:, tri]).max(axis=0)
     bent = (axis[:, :, None] * axis[:, None, :] - np.eye(3)).reshape(-1, 9)
@@ -85,10 +84,7 @@ def _strained(case: Case, packed: PackedCase, there: NDArray) -> NDArray:
     """F' C F (9, 9), with F the fields E x for each unit matrix E, x the positions at `there`."""
     x = case.structure.nodes + there
     x -= x.mean(axis=0)
-    fields = np.zeros((x.size, 9))
-    for a in range(3):
-        for b in range(3):
-            fields[a::3, 3 * a + b] = x[:, b]
+    fields = np.einsum("ac,nb->nacb", np.eye(3), x).reshape(x.size, 9)
     out, beta, body = np.zeros((9, 9)), case.rayleigh.beta, case.elastic_body
     if beta:
         k = body.tangent(body.dofs(there))

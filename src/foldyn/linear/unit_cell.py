@@ -10,7 +10,6 @@ Phys. Rev. B 47, 1993).
 
 from __future__ import annotations
 
-from collections import deque
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass, field
@@ -28,6 +27,7 @@ from foldyn.patterns.pattern import Pattern
 from foldyn.patterns.screw import Screw, motion_between, translation
 from foldyn.patterns.tiling import half_edges
 from foldyn.patterns.tiling import periods as translations_of
+from foldyn.patterns.topology import components, walk
 from foldyn.ram_limit import check_memory
 from foldyn.values import number, numbers, of_kind, show, whole
 
@@ -470,31 +470,21 @@ def _check_all(
 
 def _copies(count: int, dimensions: int, pairs: Sequence[tuple]) -> Copies:
     """Kinds of vertices from pairs (v, w, R) with w = g^R v."""
-    beside: dict[int, list[tuple[int, NDArray]]] = {}
-    for v, w, step in pairs:
-        beside.setdefault(v, []).append((w, np.array(step)))
-        beside.setdefault(w, []).append((v, -np.array(step)))
-    kind, first = np.full(count, -1), []
+    ends = np.array([pair[:2] for pair in pairs], np.int64).reshape(-1, 2)
+    steps = np.array([step for _, _, step in pairs], np.int64).reshape(-1, dimensions)
     offset = np.zeros((count, dimensions), np.int64)
-    for start in range(count):
-        if kind[start] >= 0:
-            continue
-        kind[start] = len(first)
-        first.append(start)
-        queue = deque([start])
-        while queue:
-            v = queue.popleft()
-            for w, step in beside.get(v, ()):
-                if kind[w] < 0:
-                    kind[w], offset[w] = kind[start], offset[v] + step
-                    queue.append(w)
-                elif (offset[w] != offset[v] + step).any():
-                    raise InputError(
-                        f": vertices {v} and {w} belong together in two ways; a vertex must not be "
-                        "its own copy: the motions are too short, or lead to the axis",
-                        "case",
-                    )
-    return Copies(kind, offset, np.array(first, np.int64))
+    for v, w, row, way in walk(ends, count):
+        offset[w] = offset[v] + way * steps[row]
+    apart = (offset[ends[:, 1]] != offset[ends[:, 0]] + steps).any(axis=1)
+    if apart.any():
+        v, w = ends[apart.argmax()]
+        raise InputError(
+            f": vertices {v} and {w} belong together in two ways; a vertex must not be its own "
+            "copy: the motions are too short, or lead to the axis",
+            "case",
+        )
+    kind = components(ends, count)
+    return Copies(kind, offset, np.unique(kind, return_index=True)[1])
 
 
 def _named(vertices: Sequence[int] | NDArray) -> str:

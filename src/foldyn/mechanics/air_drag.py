@@ -146,11 +146,8 @@ class AirDragTerm(Term):
     def damping_entries(self, q: NDArray, hidden: float = 1.0) -> NDArray:
         """Derivative of the forces with respect to the velocities of the last evaluation."""
         slope, n = 0.25 * self.air.slope, self.air.normal
-        ends = np.zeros((len(n), 3, 3))
-        for k, (a, b) in enumerate(((0, 1), (1, 2), (2, 0))):
-            for one in (a, b):
-                for other in (a, b):
-                    ends[:, one, other] += slope[:, k]
+        at_ends = np.eye(3) + np.roll(np.eye(3), 1, axis=1)  # side k has the corners k and k + 1
+        ends = np.einsum("tk,ka,kb->tab", slope, at_ends, at_ends)
         return np.einsum("tab,ti,tj->tabij", ends, n, n).ravel()
 
     def placed(self, order: NDArray, before: Any) -> AirDragTerm:

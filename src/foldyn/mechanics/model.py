@@ -47,6 +47,14 @@ class BarsHinges(NamedTuple):
     addresses: NDArray  # (na, 3) int64: compiled user laws (energy, response, slope)
 
 
+# arrays of `BarsHinges` with a row for each bar, and for each hinge
+OF_BARS = "bars", "bar_vector", "bar_per_length2", "bar_stiffness"
+OF_HINGES = (
+    "hinges", "hinge_stiffness", "hinge_rest", "hinge_parameters", "hinge_share", "hinge_offset",
+    "hinge_group",
+)  # fmt: skip
+
+
 class Hinges(NamedTuple):
     """Hinges of one group: rows (axis j, k, wings i, l), stiffness, rest angle and law.
 
@@ -153,22 +161,10 @@ def renumber(model: BarsHinges, order: NDArray) -> tuple[BarsHinges, NDArray]:
     """
     number = ranks(order).astype(np.uint32)
     bars, hinges = number[model.bars], number[model.hinges]
+    model = model._replace(rest=model.rest[order], bars=bars, hinges=hinges)
     bar, hinge = _rows(bars, model.bar_runs), _rows(hinges, model.hinge_runs)
-    moved = model._replace(
-        rest=model.rest[order],
-        bars=bars[bar],
-        bar_vector=model.bar_vector[bar],
-        bar_per_length2=model.bar_per_length2[bar],
-        bar_stiffness=model.bar_stiffness[bar],
-        hinges=hinges[hinge],
-        hinge_stiffness=model.hinge_stiffness[hinge],
-        hinge_rest=model.hinge_rest[hinge],
-        hinge_parameters=model.hinge_parameters[hinge],
-        hinge_share=model.hinge_share[hinge],
-        hinge_offset=model.hinge_offset[hinge],
-        hinge_group=model.hinge_group[hinge],
-    )
-    return moved, hinge
+    of_bars = {name: getattr(model, name)[bar] for name in OF_BARS}
+    return model._replace(**of_bars, **{n: getattr(model, n)[hinge] for n in OF_HINGES}), hinge
 
 
 def ranks(order: NDArray) -> NDArray:

@@ -29,7 +29,7 @@ from foldyn.mechanics.discrete_gradient import add_bar_tangent, add_hinge_tangen
 from foldyn.mechanics.energy import bar_extension
 from foldyn.mechanics.model import BarsHinges, node_order, ranks
 from foldyn.mechanics.sheet_term import SheetTerm
-from foldyn.mechanics.tangent import Sparsity, add_tangent, add_to_bar, block_keys, sparsity
+from foldyn.mechanics.tangent import Sparsity, add_tangent, add_to_bar, entry_slots, sparsity
 
 FLOOR = 1e-3  # least slope in Newton steps, relative to a hinge's stiffness, as in MERLIN2
 
@@ -196,9 +196,7 @@ class SparseBlocks:
     def _places(self, pattern: Sparsity) -> NDArray:
         """Positions of the entries in the blocks of a pattern."""
         if self._place is None or self._place[0] is not pattern:
-            keys, rows = block_keys(pattern.indptr, pattern.indices), len(pattern.indptr) - 1
-            block = np.searchsorted(keys, self._row // 3 * rows + self._column // 3)
-            self._place = pattern, 9 * block + 3 * (self._row % 3) + self._column % 3
+            self._place = pattern, entry_slots(pattern, self._row, self._column).astype(np.int64)
         return self._place[1]
 
 

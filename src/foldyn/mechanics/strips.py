@@ -85,29 +85,15 @@ def strips(model: BarsHinges, threads: int = 1, window: int = WINDOW) -> list[St
 def _of_thread(a: int, b: int, n: int, width: int, step: int) -> Strips:
     """Strips of the thread that owns nodes a to b of n."""
     left, right = a + width if a > 0 else a, b - width if b < n else b  # edge strips reach beyond
-    lowest, fresh, finished, adds = [], [], [], []
-    if b < n:
-        lowest.append((right, b))
-        fresh.append((right, b + width))
-        finished.append((right, b + width))
-        adds.append(0)
+    strips = [((right, b), (right, b + width), (right, b + width), 0)] if b < n else []
     top = a
     for low, high in pairwise(sorted({a, *range(left, right, step), right, b})):
-        lowest.append((low, high) if low < right else (b, b))
-        fresh.append((top, max(top, min(high + width, b))))
-        finished.append((low, high))
-        adds.append(int(not left <= low < right))
-        top = fresh[-1][1]
-    return Strips(
-        own=np.array([a, b]),
-        lowest=np.array(lowest, np.int64).reshape(-1, 2),
-        fresh=np.array(fresh, np.int64).reshape(-1, 2),
-        finished=np.array(finished, np.int64).reshape(-1, 2),
-        adds=np.array(adds, np.int64),
-        edge=int(b < n),
-        rows=0,
-        mask=0,
-    )
+        lowest = (low, high) if low < right else (b, b)
+        fresh = top, max(top, min(high + width, b))
+        strips.append((lowest, fresh, (low, high), int(not left <= low < right)))
+        top = fresh[1]
+    columns = (np.array(column, np.int64) for column in zip(*strips, strict=True))
+    return Strips(np.array([a, b]), *columns, edge=int(b < n), rows=0, mask=0)
 
 
 def _power(count: int) -> int:

@@ -13,6 +13,13 @@ from foldyn.jit.compiled import inner_scalar, kernel
 from foldyn.jit.eights import COUNT, eight, put
 
 
+def normals_of(corners: NDArray) -> tuple[NDArray, NDArray]:
+    """Unit normals (t, 3) and areas (t,) of triangles (t, 3, 3)."""
+    twice = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    size = np.linalg.norm(twice, axis=1)
+    return twice / size[:, None], 0.5 * size
+
+
 def triangle_stiffness(
     corners: NDArray, stretching: NDArray, bending: NDArray, first: NDArray | None = None
 ) -> tuple[NDArray, NDArray]:

@@ -215,7 +215,8 @@ class Drive:
         self.moves: Terms = [*case.imposed_terms, *case.base_terms]
         self.turns: Terms = list(case.rest_terms)
         self.following: Terms = list(case.following_terms)
-        self.planes: Terms = [_plane(case, number, own) for number, own in case.obstacle_terms]
+        apart = zip(np.eye(len(case.obstacle_terms)), case.obstacle_terms, strict=True)
+        self.planes: Terms = [(case.planes_moved(one), history) for one, (_, history) in apart]
         every = (*self.loads, *self.moves, *self.turns, *self.planes, *self.following)
         check_harmonic(case, "a periodic motion")
         found = [one.frequency for _, one in every if isinstance(one, Harmonic)]
@@ -247,14 +248,6 @@ class Drive:
         for shape, (vector, _) in zip(shapes, terms, strict=True):
             shape[: vector.size] = vector.ravel()
         return self.factors(terms, phase, level) @ shapes
-
-
-def _plane(case: Case, number: int, history: Any) -> tuple[NDArray, Any]:
-    """Displacements (p, 3), m, of all contact planes when one plane moves, and its history."""
-    assert case.contact is not None
-    moved = np.zeros((len(case.contact.planes), 3))
-    moved[number] = case.contact.planes[number].motion
-    return moved, history
 
 
 class Equation:
@@ -298,7 +291,7 @@ class Equation:
         self.level = 1.0 if driven else 0.0
         total, self.heavy = self.body.size, len(case.free_dofs)
         self._free = np.concatenate([case.free_dofs, self.body.hidden])
-        whole = case.constraints.extended(total) if case.constraints else sparse.eye_array(total)
+        whole = case.constraints.extended(total)
         self.basis = sparse.csr_array(sparse.csc_array(whole)[:, self._free])
         self.size, self.offset = len(self._free), np.zeros(total)
         self.whole: Equation = self

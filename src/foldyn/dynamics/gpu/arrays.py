@@ -17,7 +17,7 @@ from foldyn.dynamics.system import PackedCase
 from foldyn.mechanics.constant_damping import DampingMatrix
 from foldyn.mechanics.membranes import Membranes
 from foldyn.mechanics.membranes_term import MembranesTerm
-from foldyn.mechanics.model import BarsHinges
+from foldyn.mechanics.model import OF_BARS, BarsHinges
 from foldyn.mechanics.springs import Springs, SpringsTerm
 from foldyn.mechanics.viscous import Viscous, ViscousTerm, viscous
 
@@ -52,10 +52,10 @@ class CaseArrays:
         model = models[0]
         self._entries: list[tuple[NDArray, NDArray, NDArray]] = []  # nodes, slots, signs
         self._slots = 0
-        self._add(model.bars[:, 1], 1)
+        self._add(model.bars[:, 1])
         self._again(model.bars[:, 0], 0)
         for v in range(4):
-            self._add(model.hinges[:, v], 1)
+            self._add(model.hinges[:, v])
         panels = self._terms(bodies, MembranesTerm)
         membranes = [self._membranes([term.membranes for term in own]) for own in panels]
         springs = self._springs(
@@ -69,7 +69,7 @@ class CaseArrays:
             _stacked(models, TOPOLOGY)._replace(
                 bars=model.bars.astype(np.int32), hinges=model.hinges.astype(np.int32)
             ),
-            _codes(model.bar_runs, len(model.bars)), _codes(model.hinge_runs, len(model.hinges)),
+            _codes(model.bar_runs), _codes(model.hinge_runs),
             (*membranes, *[_no_panels()] * (MOST_KINDS - len(membranes))),
             springs, dampers, damping,
         )  # fmt: skip
@@ -87,9 +87,9 @@ class CaseArrays:
         rows = [[term for term in body.others if isinstance(term, kind)] for body in bodies]
         return [list(own) for own in zip(*rows, strict=True)]
 
-    def _add(self, nodes: NDArray, plus: int) -> None:
+    def _add(self, nodes: NDArray) -> None:
         """Reserve slots for vectors that act on these nodes."""
-        self._again(nodes, plus, self._slots)
+        self._again(nodes, 1, self._slots)
         self._slots += len(nodes)
 
     def _again(self, nodes: NDArray, plus: int, first: int = 0) -> None:
@@ -101,7 +101,7 @@ class CaseArrays:
 
     def _membranes(self, own: Sequence[Membranes]) -> Membranes:
         for v in range(own[0].nodes.shape[1]):
-            self._add(own[0].nodes[:, v], 1)
+            self._add(own[0].nodes[:, v])
         return _stacked(own, ("nodes", "ends", "gives"))
 
     def _springs(self, own: Sequence[Springs]) -> Springs:
@@ -111,7 +111,7 @@ class CaseArrays:
         after = lines.node[np.minimum(pieces + 1, len(lines.node) - 1)]
         for plus, minus in ((own[0].ends[:, 0], own[0].ends[:, 1]), (after, lines.node[pieces])):
             first = self._slots
-            self._add(plus, 1)
+            self._add(plus)
             self._again(minus, 0, first)
         same = "first", "node", "slack", "scaled", "row"
         stacked = _stacked([each.lines for each in own], same)
@@ -124,7 +124,7 @@ class CaseArrays:
         for v in range(4):
             nodes = own[0].dofs[:, 3 * v] // 3
             nodes[:axial] = nodes[:axial] if v < 2 else -1
-            self._add(nodes, 1)
+            self._add(nodes)
         return _stacked(own, ("dofs",))
 
     def _damping(self, cases: Sequence[PackedCase]) -> Damping:
@@ -137,7 +137,7 @@ class CaseArrays:
             for packed in cases
         ]
         if own[0].nnz:
-            self._add(np.arange(cases[0].system.rows), 1)
+            self._add(np.arange(cases[0].system.rows))
         start, column = own[0].indptr.astype(np.int64), own[0].indices.astype(np.int64)
         return Damping(start, column, _one_or_all([matrix.data for matrix in own]))
 
@@ -202,16 +202,12 @@ def _stacked(own: Sequence[Any], same: Sequence[str]) -> Any:
 def _with_force(model: BarsHinges) -> BarsHinges:
     """The model with only those bars that have a law; membranes replace the others."""
     count = int(model.bar_runs[:, 1].max(initial=0))
-    bars = ("bars", "bar_vector", "bar_per_length2", "bar_stiffness")
-    return model._replace(**{name: getattr(model, name)[:count] for name in bars})
+    return model._replace(**{name: getattr(model, name)[:count] for name in OF_BARS})
 
 
-def _codes(runs: NDArray, count: int) -> NDArray:
-    """Law code (count,) of each element."""
-    out = np.zeros(count, np.int64)
-    for start, end, code, _ in runs:
-        out[start:end] = code
-    return out
+def _codes(runs: NDArray) -> NDArray:
+    """Law code of each element."""
+    return np.repeat(runs[:, 2], runs[:, 1] - runs[:, 0])
 
 
 def _no_panels() -> Membranes:

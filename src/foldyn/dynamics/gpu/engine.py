@@ -214,16 +214,11 @@ class Launches:
         arguments = self._elements, self._nodes, self._counts, span, factor, self._state, out
         launched = self._compiled or self._kernel
         launched[self._blocks, self._threads, 0, self._room](*arguments)
-        host = Written(*(array.copy_to_host() for array in out))
-        energy = host.energy
+        u, v, reaction, energy = (array.copy_to_host() for array in out)
         if self._wide:
             energy = energy.sum(axis=1, keepdims=True)
-        host = Written(
-            host.u[:, :count],
-            host.v[:, :count],
-            host.reaction[:, :count, : self._supported],
-            energy,
-        )
+        reaction = reaction[:, :count, : self._supported]
+        host = Written(u[:, :count], v[:, :count], reaction, energy)
         return host, self._state.wrong.copy_to_host() != 0
 
     def _energies(self, count: int) -> Any:

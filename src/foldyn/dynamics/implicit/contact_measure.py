@@ -46,14 +46,8 @@ class Move(NamedTuple):
 
 def new_move() -> Move:
     """Scratch arrays for four points."""
-    start, middle, end, motion, deform = np.zeros((5, 4, 3))
-    slope, after, gradient = np.zeros((3, 12))
-    by_end, second = np.zeros((2, 12, 12))
-    weights, moves, apart = np.zeros(4), np.zeros((2, 4)), np.zeros(3)
-    return Move(
-        start, middle, end, motion, deform, by_end, slope, second, after, gradient, weights, moves,
-        apart,
-    )  # fmt: skip
+    shapes = *[(4, 3)] * 5, (12, 12), (12,), (12, 12), (12,), (12,), (4,), (2, 4), (3,)
+    return Move(*map(np.zeros, shapes))
 
 
 @inner

@@ -17,7 +17,6 @@ from scipy import sparse
 from foldyn.dynamics.implicit.contact_measure import new_move
 from foldyn.dynamics.implicit.contact_pairs import edges_step, vertex_step
 from foldyn.jit.compiled import inner, kernel
-from foldyn.mechanics.block_matrix import assembled, pairs_within
 from foldyn.mechanics.contact.candidates import FRICTION, NORMAL
 from foldyn.mechanics.contact.contact_state import Memory
 from foldyn.mechanics.contact.distances import (
@@ -33,7 +32,7 @@ from foldyn.mechanics.contact.panel_friction import add_rub, add_rub_tangent
 from foldyn.mechanics.contact.planes import farthest_stretch, height, move_planes, stretch_of
 from foldyn.mechanics.contact.potential import barrier, difference_quotient
 from foldyn.mechanics.contact.search import farthest, fastest, list_pairs, place, use_all
-from foldyn.mechanics.contact.tangent import friction_tangent
+from foldyn.mechanics.contact.tangent import friction_tangent, of_contacts
 from foldyn.mechanics.contact.term import ContactTerm
 from foldyn.mechanics.dihedral import add_hessian
 from foldyn.mechanics.discrete_gradient import discrete_gradient
@@ -116,17 +115,11 @@ class StepContact:
         nodes, blocks, _ = self._steps(True, np.zeros_like(self._on_points))
         guards = np.zeros((len(own.hinge_limit), 4, 3, 4, 3))
         acts = _guard_tangents(own, self._start, kept.x, self._move, guards)
-        nodes = np.concatenate([nodes, own.hinges[acts]])
-        four = np.concatenate([blocks.reshape(-1, 4, 3, 4, 3), guards[acts]])
-        pairs, entries = [pairs_within(nodes)], [four.swapaxes(2, 3).reshape(-1, 3, 3)]
+        at_planes = np.zeros((*kept.x.shape, 3))
         if len(own.planes):
-            at_planes = np.zeros((*kept.x.shape, 3))
             _plane_tangents(own, self._start, self._middle, self._moved, kept, at_planes)
-            met = np.flatnonzero(at_planes.any(axis=(1, 2)))
-            pairs.append(np.column_stack([met, met]))
-            entries.append(at_planes[met])
-        size = self._on_points.size
-        inner = assembled(np.concatenate(pairs), np.concatenate(entries), size)
+        hinges, size = own.hinges[acts], self._on_points.size
+        inner = of_contacts(nodes, blocks, hinges, guards[acts], at_planes, size)
         return self._contact.step_tangent(*self._ends, self._on_points, inner)
 
 

@@ -22,9 +22,10 @@ from foldyn.algebra.solvers import factorizer, takes_band
 from foldyn.algebra.superlu import SingularTangentError, SuperLU
 from foldyn.algebra.woodbury import Updated
 from foldyn.dynamics.system import PackedCase
-from foldyn.dynamics.ties import Ties, follow_masters, hand_over
+from foldyn.dynamics.ties import Ties, follow_masters, hand_over, masters_of, onto
 from foldyn.jit.compiled import kernel
 from foldyn.jit.intrinsics import flat
+from foldyn.mechanics.block_matrix import places_of
 from foldyn.mechanics.constant_damping import DampingRows
 from foldyn.mechanics.following import following_places, put_following
 from foldyn.mechanics.tangent import Sparsity, block_keys, entry_slots, joined
@@ -96,7 +97,7 @@ class StepMatrix:
         self.free = along[~held[along]]
         self._ties = system.ties
         self.added: sparse.csr_array | None = None
-        self._onto = _onto(self.free, self._ties, 3 * nodes) if system.touches else None
+        self._onto = onto(self.free, self._ties, 3 * nodes) if system.touches else None
         self._across = sparse.csr_array(self._onto.T) if self._onto is not None else None
         filled = self.blocks.filled(self.pattern) | (masses != 0.0)
         filled.reshape(-1)[self._follow] = filled.reshape(-1)[self._damped] = True
@@ -264,30 +265,19 @@ class _Sparse:
         return self._make(matrix if added is None else sparse.csc_array(matrix + added))
 
 
-def _onto(free: NDArray, ties: Ties, dofs: int) -> sparse.csr_array:
-    """Map (dofs, f) from the free dofs to all dofs, including the slaves of constraints."""
-    number = np.full(dofs, -1)
-    number[free] = np.arange(len(free))
-    start, master, value = _masters(number, free, ties)
-    return sparse.csr_array((value, master, start), (dofs, len(free)))
-
-
 def _entries(pattern: Sparsity, free: NDArray, filled: NDArray, ties: Ties) -> _Entries:
     """Entries between free dofs from the `filled` blocks, also through slaves of constraints."""
     dofs = 3 * (len(pattern.indptr) - 1)
-    number = np.full(dofs, -1)
-    number[free] = np.arange(len(free))
-    node = np.repeat(np.arange(dofs // 3), np.diff(pattern.indptr)).astype(np.int64)
-    axis = np.arange(3)
-    row = 3 * node[:, None, None] + axis[:, None] + 0 * axis
-    column = 3 * pattern.indices.astype(np.int64)[:, None, None] + axis[:, None] * 0 + axis
-    row, column = row.ravel(), column.ravel()
+    node = np.repeat(np.arange(dofs // 3), np.diff(pattern.indptr))
+    row, column = places_of(np.column_stack([node, pattern.indices]))
     if not len(ties.slave):
+        number = np.full(dofs, -1)
+        number[free] = np.arange(len(free))
         row, column = number[row], number[column]
         kept = np.flatnonzero((row >= 0) & (column >= 0) & filled.ravel())
         return _Entries(row[kept], column[kept], kept, np.zeros(0))
     kept = np.flatnonzero(filled.ravel())
-    start, master, value = _masters(number, free, ties)
+    start, master, value = masters_of(free, ties, dofs)
     count = np.diff(start)
     one, other = (count[dof[kept]] for dof in (row, column))
     first = np.repeat(np.arange(len(kept)), one * other)  # block entry of each product
@@ -295,16 +285,6 @@ def _entries(pattern: Sparsity, free: NDArray, filled: NDArray, ties: Ties) -> _
     a = start[row[kept]][first] + within // other[first]
     b = start[column[kept]][first] + within % other[first]
     return _Entries(master[a], master[b], kept[first], value[a] * value[b])
-
-
-def _masters(number: NDArray, free: NDArray, ties: Ties) -> tuple[NDArray, NDArray, NDArray]:
-    """For each dof, the free dofs that it depends on and their coefficients, in CSR format."""
-    dof = np.concatenate([free, np.repeat(ties.slave, np.diff(ties.masters.start))])
-    master = number[np.concatenate([free, ties.masters.dof])]
-    value = np.concatenate([np.ones(len(free)), ties.masters.value])
-    order = np.argsort(dof, kind="stable")
-    start = np.searchsorted(dof[order], np.arange(len(number) + 1))
-    return start, master[order], value[order]
 
 
 @kernel

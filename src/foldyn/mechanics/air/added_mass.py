@@ -12,7 +12,8 @@ from scipy.linalg import LinAlgError, cho_factor, cholesky
 from scipy.linalg.lapack import dpotri
 
 from foldyn.errors import ComputationError
-from foldyn.mechanics.air.doublets import inductance, normals_of
+from foldyn.mechanics.air.doublets import inductance
+from foldyn.mechanics.triangle import normals_of
 from foldyn.threads import one_thread
 
 COLUMNS = 256  # columns of a matrix to compute at once

@@ -24,6 +24,7 @@ from scipy import sparse
 
 from foldyn.jit.compiled import shared
 from foldyn.mechanics.air.potentials import CLOSE, inverse_distances
+from foldyn.mechanics.triangle import normals_of
 from foldyn.threads import in_threads
 
 BLOCK = 64e6  # bytes of the integrals in memory at once
@@ -84,13 +85,6 @@ def inductance(points: NDArray, triangles: NDArray, unknown: NDArray) -> NDArray
 def _one_by_one(do: Callable[[Any], None], items: Iterable[Any]) -> None:
     for item in items:
         do(item)
-
-
-def normals_of(corners: NDArray) -> tuple[NDArray, NDArray]:
-    """Unit normals (t, 3) and areas (t,) of triangles (t, 3, 3)."""
-    twice = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    size = np.linalg.norm(twice, axis=1)
-    return twice / size[:, None], 0.5 * size
 
 
 @shared

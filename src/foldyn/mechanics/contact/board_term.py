@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from functools import cached_property
 from typing import Any
 
@@ -26,7 +25,7 @@ from foldyn.mechanics.contact.boards import (
 )
 from foldyn.mechanics.contact.candidates import Tables
 from foldyn.mechanics.contact.ccd import clear_share
-from foldyn.mechanics.contact.contact_state import Memory, memory
+from foldyn.mechanics.contact.contact_state import Memory
 from foldyn.mechanics.contact.kernels import add_contact, board_kernels
 from foldyn.mechanics.contact.term import ContactTerm, contact_tangent
 from foldyn.mechanics.term import CompiledTerm, nodal
@@ -62,10 +61,6 @@ class BoardContactTerm(ContactTerm):
     def compiled(self, part: Any, kept: Memory, group: int) -> CompiledTerm:
         """Context and kernels for a thread; see `Term`."""
         return board_kernels(self.ride, self.tables, kept, part.angle, group)
-
-    def memories(self, parts: Sequence[Any]) -> list[Memory]:
-        """Kernel memory for each thread; see `Term`."""
-        return [memory(self.tables, self.sheets.panels)]
 
     def points(self, q: NDArray) -> NDArray:
         """Displacements of the riding points, followed by the nodes; see `ContactTerm`."""

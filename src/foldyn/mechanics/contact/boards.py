@@ -48,13 +48,14 @@ from foldyn.mechanics.contact.candidates import (
     ACROSS_CREASE,
     Sheets,
     Tables,
+    beside_nodes,
     distances,
     panel_nodes,
     shared_nodes,
-    starts,
     tables,
 )
 from foldyn.mechanics.contact.distances import cross, dot, minus, point
+from foldyn.mechanics.triangle import normals_of
 
 NOISE = 16.0 * float(np.finfo(float).eps)  # relative rounding error of a normal
 LEVI_CIVITA = np.zeros((3, 3, 3))
@@ -87,10 +88,8 @@ def ride_on(
     points = points.reshape(-1, 3)
     m = len(key)
     share = 1.0 / np.bincount(points.ravel(), minlength=m)[points]
-    a, b, c = (x[triangles[:, i]] for i in range(3))
-    normal = np.cross(b - a, c - a)
-    twice = np.linalg.norm(normal, axis=1)
-    normal /= twice[:, None]
+    (normal, area), (a, b, c) = normals_of(x[triangles]), np.moveaxis(x[triangles], 1, 0)
+    twice = 2.0 * area
     away = middle - a[:, None]
     heights = np.einsum("tci,ti->tc", away, normal)
     # weights from the areas spanned by a point and two nodes
@@ -121,8 +120,7 @@ def ride_on(
 def carried(ride: Ride, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Points (m,) that depend on the chosen nodes (n,) only."""
     out = np.concatenate([np.ones(len(ride.rest) - len(ride.x), bool), chosen])
-    for corner in range(3):
-        np.logical_and.at(out, ride.points[:, corner], chosen[ride.nodes].all(axis=1))
+    np.logical_and.at(out, ride.points, chosen[ride.nodes].all(axis=1, keepdims=True))
     return out
 
 
@@ -231,12 +229,10 @@ def put_lightness(ride, lightness, out):
 
 def _frames(ride: Ride, u: NDArray) -> tuple[NDArray, NDArray, NDArray, NDArray]:
     """[e_i x] (t, 3, 3, 3), unit normals (t, 3), |N| (t,) and P (t, 3, 3) of all triangles."""
-    a, b, c = np.moveaxis((ride.x + u[: len(ride.x)])[ride.nodes], 1, 0)
-    normal = np.cross(b - a, c - a)
-    size = np.linalg.norm(normal, axis=1)
-    normal /= size[:, None]
+    corners = (ride.x + u[: len(ride.x)])[ride.nodes]
+    (a, b, c), (normal, area) = np.moveaxis(corners, 1, 0), normals_of(corners)
     across = np.eye(3) - normal[:, :, None] * normal[:, None, :]
-    return _crossing(np.stack([c - b, a - c, b - a], axis=1)), normal, size, across
+    return _crossing(np.stack([c - b, a - c, b - a], axis=1)), normal, 2.0 * area, across
 
 
 def _crossing(e: NDArray) -> NDArray:
@@ -350,24 +346,16 @@ def board_tables(
     own, base = tables(points, np.zeros((0, 4), np.int64)), tables(mesh, hinges)
     first = len(ride.rest) - len(ride.x)
     panels, near, closed = _neighbors(sheets, ride, panel[:first], node[:first])
-    no_panels: list = [[]] * len(ride.x)
-    panels, near = panels + no_panels, near + no_panels
-    d0 = [of[other] for of in near for other in sorted(of)]
+    beside = beside_nodes(panels + [[] for _ in ride.x], near + [{} for _ in ride.x])
     return own._replace(
         edge_nodes=node[own.edges],
-        ranges=own.ranges._replace(
-            own_start=starts(panels),
-            own=np.array([p for of in panels for p in of], np.int64),
-            near_start=starts(near),
-            near=np.array([p for of in near for p in sorted(of)], np.int64),
-            near_d0=np.array(d0, float),
-        ),
+        ranges=own.ranges._replace(**beside),
         hinges=base.hinges + first,
         hinge_row=base.hinge_row,
         hinge_limit=base.hinge_limit * _guarded(base, closed),
         hinge_reach=base.hinge_reach,
         hinge_stiffness=base.hinge_stiffness,
-        farthest=max([own.farthest, *d0]) if sheets.panels else 0.0,
+        farthest=float(beside["near_d0"].max(initial=own.farthest)) if sheets.panels else 0.0,
     )
 
 
@@ -413,9 +401,7 @@ def _guarded(base: Tables, closed: dict[tuple[int, int], float]) -> NDArray[np.f
 
 def _above(ride: Ride) -> NDArray[np.float64]:
     """Height (m,) of the nodes above the points of boards, toward the front, at rest."""
-    a, b, c = np.moveaxis(ride.rest[ride.points], 1, 0)
-    normal = np.cross(b - a, c - a)
-    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    normal, _ = normals_of(ride.rest[ride.points])
     away = ride.x[ride.nodes] - ride.rest[ride.points]
     out = np.zeros(len(ride.rest))
     out[ride.points] = np.einsum("tci,ti->tc", away, normal)

@@ -21,6 +21,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.mechanics.model import ranks
+
 ACROSS_CREASE, ACROSS_CORNER = 2.0, 1.0  # largest d0 / t of panels that share a crease or a corner
 POINT, NORMAL, FRICTION, MOTION, HISTORY = 0, 3, 6, 7, 10  # columns of the table of planes
 PLANE_COLUMNS = 11
@@ -62,11 +64,8 @@ class Sheets:
 
     def placed(self, order: NDArray) -> Sheets:
         """Copy with node order[k] at place k."""
-        rank = np.empty(len(order), np.int64)
-        rank[order] = np.arange(len(order))
-        return replace(
-            self, nodes=self.nodes[order], triangles=rank[self.triangles], held=self.held[order]
-        )
+        triangles = ranks(order)[self.triangles]
+        return replace(self, nodes=self.nodes[order], triangles=triangles, held=self.held[order])
 
 
 class Ranges(NamedTuple):
@@ -137,7 +136,7 @@ def tables(sheets: Sheets, hinges: NDArray) -> Tables:
     if not sheets.panels:
         guarded = guarded[:0]
     surface = np.unique(triangles)
-    d0 = [of[panel] for of in near for panel in sorted(of)]
+    beside = beside_nodes(own, near)
     return Tables(
         rest=nodes,
         triangles=triangles,
@@ -152,11 +151,7 @@ def tables(sheets: Sheets, hinges: NDArray) -> Tables:
         ranges=Ranges(
             node_thickness=thickest,
             panel_thickness=np.ascontiguousarray(sheets.thickness, float),
-            own_start=starts(own),
-            own=_whole([panel for of in own for panel in of]),
-            near_start=starts(near),
-            near=_whole([panel for of in near for panel in sorted(of)]),
-            near_d0=np.array(d0, float),
+            **beside,
         ),
         surface=_whole(surface),
         meeting=_whole(surface[~sheets.held[surface]]),
@@ -168,7 +163,7 @@ def tables(sheets: Sheets, hinges: NDArray) -> Tables:
         planes=np.ascontiguousarray(sheets.planes, float).reshape(-1, PLANE_COLUMNS),
         stiffness=float(sheets.stiffness),
         friction=float(sheets.friction) if sheets.panels else 0.0,
-        farthest=max([float(thickest.max(initial=0.0)), *d0]) if sheets.panels else 0.0,
+        farthest=float(np.append(beside["near_d0"], thickest).max()) if sheets.panels else 0.0,
         skin=SKIN * float(np.sqrt(square).mean()),
     )
 
@@ -296,6 +291,18 @@ def hinge_guards(
     limit[whole] = np.minimum(GUARDED, thickness[j] / height)
     strength[whole] = stiffness * height**2 * share
     return whole, limit, reach, strength
+
+
+def beside_nodes(own: list[list[int]], near: list[dict[int, float]]) -> dict[str, NDArray]:
+    """Arrays of `Ranges`: each node's own panels, and panels near these with their d0 (m)."""
+    pairs = [pair for of in near for pair in sorted(of.items())]
+    return {
+        "own_start": starts(own),
+        "own": _whole([panel for of in own for panel in of]),
+        "near_start": starts(near),
+        "near": _whole([panel for panel, _ in pairs]),
+        "near_d0": np.array([d0 for _, d0 in pairs], float),
+    }
 
 
 def starts(lists: list) -> NDArray:

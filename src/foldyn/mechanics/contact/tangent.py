@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.jit.compiled import inner, kernel
 from foldyn.jit.intrinsics import flat
+from foldyn.mechanics.block_matrix import assembled, pairs_within
 from foldyn.mechanics.contact.candidates import FRICTION, NORMAL, Tables
 from foldyn.mechanics.contact.contact_state import Memory
 from foldyn.mechanics.contact.distances import (
@@ -132,6 +134,18 @@ def friction_tangent(tables, x, moved, memory, p, i, stiffness, out):
                 along -= stretch[a] * stretch[b] / (stretch[3] * stretch[3])
                 out[a, b] -= rate * stretch[a] / stretch[3] * tables.planes[p, NORMAL + b]
             out[a, b] += k * share * along
+
+
+def of_contacts(
+    nodes: NDArray, blocks: NDArray, hinges: NDArray, guards: NDArray, planes: NDArray, size: int
+) -> sparse.csr_array:
+    """Matrix (size, size) of pairs (k, 12, 12), hinge guards (h, 4, 3, 4, 3), planes (n, 3, 3)."""
+    four = np.concatenate([blocks.reshape(-1, 4, 3, 4, 3), guards])
+    met = np.flatnonzero(planes.any(axis=(1, 2)))
+    within = pairs_within(np.concatenate([nodes, hinges]))
+    pairs = np.concatenate([within, np.column_stack([met, met])])
+    entries = np.concatenate([four.swapaxes(2, 3).reshape(-1, 3, 3), planes[met]])
+    return assembled(pairs, entries, size)
 
 
 def held_by_planes(own: Tables, kept: Memory, size: int) -> sparse.csr_array:

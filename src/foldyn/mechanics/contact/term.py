@@ -14,7 +14,6 @@ from scipy import sparse
 
 from foldyn.jit.context import Context
 from foldyn.mechanics.assembly import Assembly
-from foldyn.mechanics.block_matrix import assembled, pairs_within
 from foldyn.mechanics.contact.candidates import HISTORY, NORMAL, Sheets, Tables, tables
 from foldyn.mechanics.contact.ccd import KEEP, clear_share
 from foldyn.mechanics.contact.contact_state import Memory, memories, memory
@@ -26,6 +25,7 @@ from foldyn.mechanics.contact.tangent import (
     guard_tangents,
     held_by_panels,
     held_by_planes,
+    of_contacts,
     pair_tangents,
     plane_tangents,
     touching_pairs,
@@ -299,12 +299,7 @@ def contact_tangent(own: Tables, kept: Memory, size: int) -> sparse.csr_array:
     pair_tangents(own, kept, first, second, nodes, blocks)
     guards = np.zeros((len(own.hinge_limit), 4, 3, 4, 3))
     acts = guard_tangents(own, kept.x, guards)
-    nodes = np.concatenate([nodes, own.hinges[acts]])
-    four = np.concatenate([blocks.reshape(-1, 4, 3, 4, 3), guards[acts]])
-    pairs, entries = [pairs_within(nodes)], [four.swapaxes(2, 3).reshape(-1, 3, 3)]
+    at_planes = np.zeros((0, 3, 3))
     if len(own.planes):
-        normal = plane_tangents(own, kept.x, kept).sum(axis=0)
-        met = np.flatnonzero(normal.any(axis=(1, 2)))
-        pairs.append(np.column_stack([met, met]))
-        entries.append(normal[met])
-    return assembled(np.concatenate(pairs), np.concatenate(entries), size)
+        at_planes = plane_tangents(own, kept.x, kept).sum(axis=0)
+    return of_contacts(nodes, blocks, own.hinges[acts], guards[acts], at_planes, size)
