@@ -94,7 +94,7 @@ def test_sweeps_measure_properties(tmp_path):
     found = fd.read_case(path).run()
     assert float(swept.coupling_stretch_twist[0]) == float(found.stretch_twist)
     for measure, reason in (
-        ("poissons_ratio[x]", "it has coupling, axial_stiffness"),
+        ("poissons_ratio[x]", "it has coupling, mean_load"),
         ("coupling[xx]", "choose one of stretch, twist"),
     ):  # fmt: skip
         with pytest.raises(InputError, match=reason):

@@ -98,3 +98,33 @@ def test_what_a_cell_lacks_is_refused():
             lambda dihedral: miura(dihedral).case, {"dihedral": 100.0}, measures="density",
             analysis=EFFECTIVE,
         )  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("measure", "analysis", "reason"),
+    [
+        ("mass", EFFECTIVE, "of a cell take density"),
+        ("modulus[x]", {**EFFECTIVE, "state": fd.State()}, "would stay as it is while the cell"),
+        (
+            {"mine": (lambda r, c: float(r.density), lambda r, c: {"density": 1.0})}, EFFECTIVE,
+            "no derivatives by variables of this result",
+        ),
+    ],
+)  # fmt: skip
+def test_what_has_no_gradient_is_refused(measure, analysis, reason):
+    with pytest.raises(InputError, match=reason):
+        fd.sensitivity(miura, {"dihedral": 100.0}, measures=measure, analysis=analysis)
+
+
+def test_a_file_says_its_own_analysis(tmp_path: Path):
+    path = tmp_path / "sheet.toml"
+    path.write_text(
+        '[pattern]\nkind = "miura"\n[sheet]\nyoungs_modulus = 3e9\npoissons_ratio = 0.3\n'
+        'thickness = 1e-4\ndensity = 1200.0\n[analysis]\nkind = "effective"\n'
+    )
+    parameters = {"pattern.dihedral": 100.0}
+    with pytest.raises(InputError, match=r"analysis: effective properties of a case file"):
+        fd.sensitivity(path, parameters, measures="modulus[x]", analysis={"secant": 1.0})
+    modes = {"kind": "modes", "count": 8}
+    found = fd.sensitivity(path, parameters, measures="frequency[1]", analysis=modes)
+    assert np.isfinite(found["gradient_pattern.dihedral"]).all()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -99,3 +100,43 @@ def test_what_has_no_gradient_is_refused():
         fd.sensitivity(build, {"x": 0.02}, measures="crease_moment", analysis=moving)
     with pytest.raises(InputError, match=r"crease_moment: .*bar_length"):
         fd.sensitivity(build(0.02), ["bar_length"], measures="crease_moment", analysis=PATH)
+
+
+@pytest.mark.matrix
+@pytest.mark.parametrize("force", [0.2, 15.0])
+def test_a_small_moment_changes_as_a_large_one(force):
+    """Its sign is that of the design, so that its size has no kink where it is nearly 0."""
+    case = folded("merlin2", 0.02, np.full(4, 0.05))
+    push = replace(case.loads[0], vector=(0.0, 1e-3 * force, -5e-3 * force))
+
+    def build(rest: float) -> fd.Case:
+        angles = case.structure.fold_rest.copy()
+        angles[2] = rest
+        return replace(case, structure=replace(case.structure, fold_rest=angles), loads=[push])
+
+    path = {"kind": "statics", "method": "newton", "load_factors": [1.0]}
+    design = Design(build, {"rest": case.structure.fold_rest[2]}, ["crease_moment[2]"], path)
+    design.step = 1e-7
+    exact = design.difference({"rest": 1.0})
+    np.testing.assert_allclose(design.gradient()["rest"], exact, rtol=0.01)
+
+
+@pytest.mark.matrix
+def test_equal_stresses_that_separate_have_no_derivative():
+    """Two creases of one stiffness carry one moment; a change of both keeps it so."""
+    pattern = fd.patterns.miura(cells=(1, 1), panel_angle=62.0, dihedral=110)
+
+    def build(**given: Any) -> fd.Case:
+        stiffness = np.array([given["one"], given["other"], 0.05, 0.05])
+        made = fd.discretize(
+            pattern, fd.Sheet(1e8, 0.3, 0.01, 1000.0), preset="merlin2", crease_stiffness=stiffness
+        )
+        ends = pattern.vertices[:, 0] == pattern.vertices[:, 0].max()
+        push = fd.Force(np.flatnonzero(ends).tolist(), (1e-3, 0.0, 0.0))
+        return fd.Case(made, [fd.Fix("xmin", "xyz")], [push])
+
+    found = fd.sensitivity(
+        lambda both: build(one=both, other=both), {"both": 0.05}, measures="crease_moment",
+        analysis=PATH,
+    )  # fmt: skip
+    assert np.isfinite(found["gradient_both"]).all()

@@ -121,7 +121,7 @@ def test_choice_of_the_backend(monkeypatch):
     assert factorizer("auto", 10**6)[0] == PRESENT[-1]
     without(monkeypatch, "pardiso")
     assert factorizer("auto", 10**6)[0] == "rslab"
-    with pytest.raises(InputError, match=r"'pardiso': needs pip install 'foldyn\[mkl\]'"):
+    with pytest.raises(InputError, match=r'"pardiso": needs pip install "foldyn\[mkl\]"'):
         factorizer("pardiso", 10)
     without(monkeypatch, "rslab")
     assert factorizer("auto", 10**6)[0] == "superlu"

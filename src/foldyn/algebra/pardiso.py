@@ -154,14 +154,16 @@ class Rslab:
         from rslab import analyze
 
         if self._pattern is None or not self._pattern.fits(matrix):
-            self._pattern = Pattern(matrix)
-            threads = int(os.environ.get("NUMBA_NUM_THREADS", processors()))
-            lower = self._pattern.lower.astype(float)
-            self._analysis = analyze(lower, path="ldlt", threads=threads)
+            pattern, threads = (
+                Pattern(matrix),
+                int(os.environ.get("NUMBA_NUM_THREADS", processors())),
+            )
+            self._analysis = analyze(pattern.lower.astype(float), path="ldlt", threads=threads)
+            self._pattern = pattern
         try:
             return RslabFactors(self._analysis.factor(self._pattern.values(finite(matrix))))
         except RuntimeError as error:  # "matrix is numerically rank-deficient"
-            raise SingularTangentError("the tangent is singular") from error
+            raise SingularTangentError(f"the tangent is singular ({error})") from error
 
 
 class RslabFactors(Factorization):
@@ -172,6 +174,8 @@ class RslabFactors(Factorization):
 
     def solve(self, b: NDArray) -> NDArray:
         """Solution x of A x = b, (n,) or (n, k)."""
+        if not b.size:
+            return b.astype(float)
         return self._factors.solve_many(np.asarray(b, float).reshape(len(b), -1)).reshape(b.shape)
 
     def negative(self) -> int:

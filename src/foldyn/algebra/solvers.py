@@ -55,7 +55,7 @@ def factorizer(name: str, size: int) -> tuple[str, Factorizer]:
         *_, best = (SOLVERS[key] for key in fit if key == name or SOLVERS[key].wheels)
         return name, _timed(SOLVERS[name], best)
     if not SOLVERS[name].found():
-        raise InputError(f"solver = {name!r}: needs pip install {SOLVERS[name].package!r}")
+        raise InputError(f'solver = "{name}": needs pip install "{SOLVERS[name].package}"')
     return name, SOLVERS[name].make()
 
 

@@ -69,9 +69,9 @@ def info() -> str:
         f"optional parts for inverse design: NLopt, {moving}; CMA-ES, {drawn}",
         *(
             f"linear solver from {solver.worthwhile:,} directions: {name}, "
-            f"{'found' if solver.found() else f'missing: pip install {solver.package}'}"
+            + ("found" if solver.found() else f'missing: pip install "{solver.package}"')
             for name, solver in SOLVERS.items()
-            if solver.worthwhile > 0
+            if solver.worthwhile > 0 and solver.wheels
         ),
         f"methods of paths: {', '.join(PATH_METHODS)}",
         f"methods of frequency responses: {', '.join(FRF_METHODS)}",

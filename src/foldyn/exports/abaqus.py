@@ -17,13 +17,16 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import xarray
 from numpy.typing import NDArray
 
 from foldyn.cases import Case
 from foldyn.exports.creased_shell import CreasedShell, write_deck
+from foldyn.exports.sections import section
 from foldyn.structures import Ply, Sheet
 from foldyn.structures.ply import pair
 from foldyn.values import choice
+from foldyn.writing import write_text
 
 ELEMENTS = ("STRI3", "S3")
 SHEET = "SHEET"
@@ -44,7 +47,7 @@ def write(
     Parameters
     ----------
     result : Any
-        Not needed.
+        Needed only of `foldyn.effective`, of which the section or material is written instead.
     path : Path
     case : Case
     divisions : int, optional
@@ -54,6 +57,9 @@ def write(
     element : {"STRI3", "S3"}, optional
         Kind of the triangles; STRI3 is a thin shell, as in Foldyn.
     """
+    if isinstance(result, xarray.Dataset) and result.attrs["foldyn_result"] == "effective":
+        write_text("\n".join([*section(result), ""]), path)
+        return [path]
     kind = ELEMENTS[0] if element is None else choice("element", element, ELEMENTS)
     return write_deck(case, path, divisions, modes, partial(_deck, kind=kind))
 

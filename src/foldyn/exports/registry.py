@@ -97,7 +97,14 @@ _EXPORTS = (
         needs_case=False,
     ),
     Export("opensees", (".tcl",), OF_SHEETS, opensees.write, "OpenSees: the shell", of_cases=True),
-    Export("abaqus", (".inp",), OF_SHEETS, abaqus.write, "Abaqus: the shell", of_cases=True),
+    Export(
+        "abaqus",
+        (".inp",),
+        (*OF_SHEETS, "effective"),
+        abaqus.write,
+        "Abaqus: the shell, or effective properties as a section",
+        of_cases=True,
+    ),
 )
 
 EXPORTS: dict[str, Export] = {each.name: each for each in _EXPORTS}

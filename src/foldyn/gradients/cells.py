@@ -8,7 +8,7 @@ from typing import Any
 import xarray
 
 from foldyn.analyses import CaseFile
-from foldyn.errors import quietly
+from foldyn.errors import InputError, quietly
 from foldyn.gradients.parameters import Differentiated
 from foldyn.linear import UnitCell, effective
 from foldyn.mechanics.pullback import Arrays
@@ -25,6 +25,12 @@ class CellGradient(Differentiated):
     """
 
     def __init__(self, cell: UnitCell | CaseFile, arguments: Mapping[str, Any]) -> None:
+        if arguments.get("state") is not None:
+            raise InputError(
+                ": would stay as it is while the cell changes; give a case file with stretch or "
+                "turn, which finds the equilibrium of each cell",
+                "state",
+            )
         self._arguments = arguments
         self.result = self._computed(cell)
 

@@ -65,7 +65,7 @@ class Chain(NamedTuple):
     slopes: dict[str, Any]
     cut: bool  # whether cut lengths of bars are among the parameters
     shared: dict[Any, Any]  # intermediate results shared by measures
-    beside: Mapping[str, dict[str, NDArray]]  # derivatives of measures that are differenced
+    beside: Mapping[str, list[dict[str, NDArray]]]  # derivatives of measures that are differenced
 
     def of(self, one: Wanted) -> tuple[float, dict[str, NDArray]]:
         """Value of a quantity, and derivatives with respect to all entries of each parameter."""
@@ -90,7 +90,10 @@ class Chain(NamedTuple):
                 "of the parameters, or take another measure, such as displacement"
             )
         if derivative.beside:
-            return _Changes({}, self.beside[measure.text], {})
+            first, *others = self.beside[measure.text]
+            for other in others:
+                self._check_same(first, other, len(others) + 1, value)
+            return _Changes({}, first, {})
         places: list[dict[str, Any]] = [{}]
         if derivative.places:
             found = derivative.places(self._subject(measure), self.case, **measure.arguments)
@@ -99,18 +102,24 @@ class Chain(NamedTuple):
         if len(places) > 1:
             shares = np.random.default_rng(0).dirichlet(np.ones(len(places) - 1))
             other = self._at(measure, derivative, places[1:], shares)
-            pair = [self._by_parameters(each) for each in (one, other)]
-            left, right = (
-                np.concatenate([by * self.design.size(name).ravel() for name, by in each.items()])
-                for each in pair
-            )
-            size = max(np.abs(left).max(), np.abs(right).max())
-            if np.abs(left - right).max() > SAME * size + ROUNDING * abs(value):
-                raise InputError(
-                    f"is reached at {len(places)} places at once, which separate as the design "
-                    "changes: it has no derivative; take a measure of one place, or mean_square"
-                )
+            left, right = (self._by_parameters(each) for each in (one, other))
+            self._check_same(left, right, len(places), value)
         return one
+
+    def _check_same(
+        self, one: Mapping[str, NDArray], other: Mapping[str, NDArray], count: int, value: float
+    ) -> None:
+        """Refuse an extreme whose derivatives differ between places that reach it."""
+        left, right = (
+            np.concatenate([by * self.design.size(name).ravel() for name, by in each.items()])
+            for each in (one, other)
+        )
+        size = max(np.abs(left).max(), np.abs(right).max())
+        if np.abs(left - right).max() > SAME * size + ROUNDING * abs(value):
+            raise InputError(
+                f"is reached at {count} places at once, which separate as the design changes: it "
+                "has no derivative; take a measure of one place, or mean_square"
+            )
 
     def _subject(self, measure: Asked) -> Any:
         """The result, or the intermediate result of a measure."""
@@ -176,24 +185,38 @@ def differenced(
 
 
 def beside(
-    found: Differentiated, design: Parameters, wanted: Sequence[Wanted]
-) -> dict[str, dict[str, NDArray]]:
-    """Derivatives of the measures that are differenced, all from the same results."""
-    measures = {
-        measure.text: measure
-        for one in wanted
-        for measure, derivative in one.measures.values()
-        if derivative.beside
-    }
+    found: Differentiated, case: Case, design: Parameters, wanted: Sequence[Wanted],
+    shared: dict[Any, Any],
+) -> dict[str, list[dict[str, NDArray]]]:  # fmt: skip
+    """Derivatives of the measures that are differenced, at each place that reaches them.
 
-    def values(case: Case) -> dict[str, float]:
-        with said_of(", ".join(measures)):
-            near, shared = found.beside(case), {}
-        return {text: one.number(near, case, shared) for text, one in measures.items()}
+    All are found from the same results beside. `shared`: see `Chain`.
+    """
+    numbers: dict[str, list[Callable[[Any], float]]] = {}
+    through: dict[str, Any] = {}
+    for one in wanted:
+        for measure, derivative in one.measures.values():
+            if derivative.beside:
+                measure.number(found.result, case, shared)
+                text, through[measure.text] = measure.text, measure.measure.through
+                subject = shared.get(through[text], found.result)
+                with said_of(text):
+                    numbers[text] = derivative.beside(subject, case, **measure.arguments)
 
-    if not measures:
+    def values(other: Case) -> dict[str, float]:
+        with said_of(", ".join(numbers)):
+            near = found.beside(other)
+        subjects = {each: each(near, other) if each else near for each in {*through.values()}}
+        return {
+            f"{text}{k}": number(subjects[through[text]])
+            for text, own in numbers.items()
+            for k, number in enumerate(own)
+        }
+
+    if not numbers:
         return {}
-    return differenced(design, values, [STEP])
+    rates = differenced(design, values, [STEP])
+    return {text: [rates[f"{text}{k}"] for k in range(len(own))] for text, own in numbers.items()}
 
 
 @contextmanager

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -15,10 +16,11 @@ from foldyn.errors import InputError
 from foldyn.gradients.expressions import TIE
 from foldyn.gradients.parameters import Gradient
 from foldyn.linear.frf import quantity_of
+from foldyn.linear.margins import margins
 from foldyn.signals.peaks import magnitude_curve
 from foldyn.statics import Equilibrium, Landscape
 from foldyn.sweeps import measures
-from foldyn.sweeps.cell_measures import PROPERTIES
+from foldyn.sweeps.cell_measures import EFFECTIVE, PROPERTIES
 from foldyn.sweeps.measure import Asked, asked
 from foldyn.viewer.states import bar_strain
 
@@ -39,8 +41,9 @@ class Derivative(NamedTuple):
     places : for an extreme, from the same arguments, all places that reach it; `seeds` and `frozen`
         take one of them as `at`. The measure has a derivative if it is the same at all places.
     cut : whether the measure depends on the cut lengths of bars, in addition to the result.
-    beside : whether the measure is differenced, from results of slightly different cases; nothing
-        else is needed then.
+    beside : for a measure that is differenced, from the result (or the measure's intermediate
+        result), the case and the arguments: for each place that reaches it, the measure there as a
+        function of the result of a slightly different case. Nothing else is needed then.
     """
 
     seeds: Callable[..., Seeds]
@@ -48,7 +51,7 @@ class Derivative(NamedTuple):
     numbers: Callable[..., Gradient] | None = None
     places: Callable[..., Sequence[Any]] | None = None
     cut: bool = False
-    beside: bool = False
+    beside: Callable[..., list[Callable[[Any], float]]] | None = None
 
 
 def _largest(numbers: NDArray) -> list[tuple[int, ...]]:
@@ -334,6 +337,27 @@ def _climb(start: int, end: int) -> Derivative:
     return Derivative(_nothing, frozen, numbers, places, cut=True)
 
 
+# ------------------------------------------------------------------ measures that are differenced
+def _greatest(
+    name: str, found: xr.Dataset, case: Case, **chosen: int
+) -> list[Callable[[xr.Dataset], float]]:
+    """The largest von Mises stress, or moment of a crease, of all or of one panel or crease."""
+    own = found[name].values
+    owner = found["point_panel"].values[:, None] if "point" in found[name].dims else found["crease"]
+    size = np.where(np.isin(owner, [*chosen.values()]) | (not chosen), np.abs(own), -1.0)
+    if not size.max() > 0.0:
+        raise InputError("is 0, where a size has no derivative")
+    sign = np.sign(own)
+    return [lambda near, at=at: float(sign[at] * near[name].values[at]) for at in _largest(size)]
+
+
+def _least_margin(found: xr.Dataset, case: Case) -> list[Callable[[xr.Dataset], float]]:
+    own = np.nan_to_num(margins(found)["panel_margin"].values, nan=np.inf)
+    return [
+        lambda near, at=at: float(margins(near)["panel_margin"].values[at]) for at in _largest(-own)
+    ]
+
+
 # ------------------------------------------------------------------ frequency responses
 def _response(result: xr.Dataset, case: Case, node: int, axis: str, frequency: float) -> Seeds:
     k = measures.nearest_of(result, "frequency", frequency)
@@ -403,10 +427,16 @@ DERIVATIVES: Mapping[str, Derivative] = {
     "strain": Derivative(_strain, _strain_of, places=_strained_most, cut=True),
     "strain_energy": Derivative(_strain_energy, _strain_energy_of, places=_tensest, cut=True),
     "clearance": Derivative(_clearance, _clearance_of, places=_closest),
-    **dict.fromkeys(
-        ["von_mises", "crease_moment", "margin", *PROPERTIES],
-        Derivative(_nothing, cut=True, beside=True),
-    ),
+    "von_mises": Derivative(_nothing, cut=True, beside=partial(_greatest, "von_mises")),
+    "crease_moment": Derivative(_nothing, cut=True, beside=partial(_greatest, "crease_moment")),
+    "margin": Derivative(_nothing, cut=True, beside=_least_margin),
+    **{
+        name: Derivative(
+            _nothing,
+            beside=lambda result, case, f=one.function, **at: [partial(f, case=case, **at)],
+        )
+        for name, one in PROPERTIES.items()
+    },
     "reaction": Derivative(_reaction),
     "limit_load": Derivative(_limit_load),
     "load_at": Derivative(_load_at),
@@ -431,6 +461,8 @@ def one_number(text: str, kind: Any) -> Asked:
     kinds = one.measure.kinds
     if kinds and kind not in kinds:
         raise InputError(f": {text} needs a result of kind {' or '.join(kinds)}, not {kind}")
+    if one.measure.name == "mass" and kind == EFFECTIVE:
+        raise InputError(f": {text} is that of a structure; of a cell take density")
     if one.measure.dims:
         raise InputError(f": {text} is an array; ask for one number of it, such as frequency[1]")
     return one

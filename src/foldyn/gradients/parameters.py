@@ -105,7 +105,9 @@ class Differentiated:
 
         seeds : derivatives of the function with respect to variables of the result.
         """
-        raise NotImplementedError
+        raise InputError(
+            "has no derivatives by variables of this result; give measures by their names"
+        )
 
     def beside(self, case: Case) -> xarray.Dataset:
         """Result of a slightly different case, to be differenced."""

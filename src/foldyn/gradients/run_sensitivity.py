@@ -126,7 +126,8 @@ def sensitivity(
 
     Notes
     -----
-    Derivatives of the mechanics are analytic. Derivatives of a case's numbers with respect to the
+    Derivatives of the mechanics are analytic, but for stresses, moments of creases, margins and
+    effective properties, which are differenced. Derivatives of a case's numbers with respect to the
     parameters are central differences of fourth order, for which no equations are solved. Motions
     are differentiated as computed, step by step, with fixed steps: give `dt` if the step should not
     depend on the case.
@@ -159,7 +160,9 @@ def sensitivity(
     direction = None if along is None else _direction(along, design)
     if direction is not None and isinstance(found, ModesGradient):
         found = found.along(lambda gradient: _rate(slopes, direction, gradient))
-    chain = Chain(found, case, design, slopes, cut, {}, beside(found, design, wanted))
+    shared: dict[Any, Any] = {}
+    apart = beside(found, case, design, wanted, shared)
+    chain = Chain(found, case, design, slopes, cut, shared, apart)
     values, gradients = zip(*(chain.of(one) for one in wanted), strict=True)
     data: dict[str, Any] = {"value": ("measure", np.array(values))}
     if direction is None:
@@ -199,7 +202,7 @@ def source_of(build: Source, parameters: Any, analysis: Mapping[str, Any] | None
     if isinstance(build, Case):
         build, values = _of_arrays(build, parameters)
     elif isinstance(build, str | os.PathLike):
-        build, values, own = _of_file(build, parameters)
+        build, values, own = _of_file(build, parameters, analysis)
         analysis = {**own, **of_kind("analysis", {} if analysis is None else analysis, Mapping)}
     elif callable(build):
         values = checked(parameters)
@@ -316,7 +319,7 @@ def case_file_at(place: Path, document: dict[str, Any], values: Mapping[str, Any
 
 
 def _of_file(
-    path: str | os.PathLike[str], parameters: Any
+    path: str | os.PathLike[str], parameters: Any, analysis: Mapping[str, Any] | None
 ) -> tuple[Callable[..., Case], dict[str, NDArray], dict[str, Any]]:
     """A function that returns the case for other values of keys, the values, and the analysis."""
     place = path_of(path, "build")
@@ -331,13 +334,21 @@ def _of_file(
             place,
         )
     kind = own.analysis.kind
-    whole = kind == EFFECTIVE  # the file says how its cell repeats, and in which state
+    asked = (analysis or {}).get("kind", kind)
+    whole = asked == EFFECTIVE  # the file says how its cell repeats, and in which state
+    if whole and (kind != EFFECTIVE or {*(analysis or {})} - {"kind"}):
+        raise InputError(
+            ": effective properties of a case file are those of its own [analysis]; give kind = "
+            '"effective" and the other keys there',
+            "analysis",
+        )
 
     def build(**values: Any) -> Any:
         made = case_file_at(place, document, values)
         return made if whole else made.case()
 
-    return build, checked(parameters), {"kind": kind, **({} if whole else own.analysis.arguments)}
+    arguments = own.analysis.arguments if asked == kind and not whole else {}
+    return build, checked(parameters), {"kind": kind, **arguments}
 
 
 # ------------------------------------------------------------------ measures

@@ -366,7 +366,8 @@ class Equivalent(NamedTuple):
 
 KINDS = {
     1: Equivalent(
-        _beam_frame, _beam, beam_properties, list(BEAM), 1, "kg/m", {"load": list(BEAM)},
+        _beam_frame, _beam, beam_properties, list(BEAM), 1, "kg/m",
+        {"load": list(BEAM), "bend": ["least", "greatest"]},
     ),
     2: Equivalent(
         _plate_frame, _plate, plate_properties,

@@ -142,7 +142,8 @@ def _along(bands: xr.Dataset) -> tuple[np.ndarray, str]:
 
 EFFECTIVE = (
     "poissons_ratio", "bending_poissons_ratio", "modulus", "bending_modulus", "shear_modulus",
-    "axial_stiffness", "torsional_stiffness", "stretch_twist", "mean_force", "mean_load",
+    "twisting_modulus", "axial_stiffness", "torsional_stiffness", "bending_stiffness",
+    "stretch_twist", "density", "mean_force", "mean_load",
 )  # fmt: skip
 """Effective properties that are drawn and listed by state."""
 
@@ -183,6 +184,12 @@ def plot_effective(effective: xr.Dataset, *, title: str = "") -> Figure:
     return figure
 
 
+def with_unit(values: xr.DataArray) -> str:
+    """The unit in parentheses, if there is one."""
+    unit = values.attrs.get("units", "1")
+    return "" if unit == "1" else f" ({unit})"
+
+
 def _draw_states(effective: xr.Dataset, title: str) -> Figure:
     """Draw the short variables against the states, each in its axes."""
     shown = [name for name in EFFECTIVE if name in effective]
@@ -192,14 +199,13 @@ def _draw_states(effective: xr.Dataset, title: str) -> Figure:
         own = effective[name].transpose("state", ...)
         labels = own[own.dims[1]].values if own.ndim > 1 else [""]
         for label, values in zip(labels, own.values.reshape(len(state), -1).T, strict=True):
-            axes.plot(state.values, values, lw=1.4, label=label)
-        unit = "" if own.attrs["units"] == "1" else f" ({own.attrs['units']})"
+            axes.plot(state.values, values, "o-", lw=1.4, ms=2.5, label=label)
         words = name.replace("poissons", "Poisson's").replace("_", " ")
-        axes.set_title(f"{words}{unit}", fontsize="medium")
+        axes.set_title(f"{words}{with_unit(own)}", fontsize="medium")
         if own.ndim > 1:
             axes.legend(fontsize="small")
         if k >= len(shown) - 2:
-            axes.set_xlabel(state.attrs["long_name"])
+            axes.set_xlabel(f"{state.attrs['long_name']}{with_unit(state)}")
     for axes in figure.axes[len(shown) :]:
         axes.set_axis_off()
     return figure

@@ -119,6 +119,11 @@ PROPERTIES = {
             ("bending", "N m", "bending stiffness of the sheet"),
             ("coupling", "", "forces per curvature of the sheet, or stiffness of others"),
         ),
+        ("load",): (
+            ("mean_force", "N/m", "mean force of the sheet in its state"),
+            ("mean_load", "", "mean load of the chain, or stress of the solid, in its state"),
+        ),
+        ("bend",): (("bending_stiffness", "N m2", "least or greatest EI of the chain"),),
         ("plane",): (("shear_modulus", "", "shear modulus of the sheet, or solid in a plane"),),
         (): (
             ("twisting_modulus", "N m", "moment of twist of the sheet per unit of twist"),

@@ -23,7 +23,7 @@ from foldyn.values import choice, number, show, suggest
 
 F = TypeVar("F", bound=Callable[..., Any])
 NODE, AXIS, MODE, BAND = "node", "axis", "mode", "band"
-WORDS = ("model", "point", "leg", "load", "strain", "pair", "plane")
+WORDS = ("model", "point", "leg", "load", "strain", "pair", "plane", "bend")
 """Arguments of measures that are names in the result."""
 REALS = {"time": "s", "displacement": "m", "frequency": "Hz"}
 """Arguments of measures that are numbers, with their units."""

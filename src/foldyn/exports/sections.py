@@ -1,0 +1,63 @@
+"""Abaqus: a sheet that repeats as the section of a shell, or as the material of a solid.
+
+Keywords and the order of the numbers follow the Abaqus Keywords Reference Guide. CalculiX reads the
+material, too; it expands shells to solids, and has no section with a stiffness of its own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+import xarray
+from numpy.typing import NDArray
+
+from foldyn.errors import InputError
+
+IN_A_LINE = 8
+SOLID = [0, 1, 2, 5, 4, 3]  # 11, 22, 33, 12, 13, 23 in the order of `effective`
+
+
+def section(result: xarray.Dataset) -> Iterator[str]:
+    """Lines of the section, or the material, of a result of `effective` in one state.
+
+    Raises
+    ------
+    InputError
+        A chain or tube, or several states.
+    """
+    if "state" in result.dims:
+        raise InputError(": has several states; choose one, as result.isel(state=0)", "result")
+    density = f"{result['density'].item():.12g}" if "density" in result else ""
+    if "membrane" in result:
+        coupling = result["coupling"].values
+        matrix = np.block(
+            [[result["membrane"].values, coupling], [coupling.T, result["bending"].values]]
+        )
+        yield "** A repeated sheet as a plate, made by Foldyn, in SI units. Elements lie in the"
+        yield "** plane of its center of mass. Shells that shear need *TRANSVERSE SHEAR STIFFNESS."
+        yield "*ORIENTATION, NAME=SHEET_AXES"
+        yield _line(result["frame"].values[:2].ravel())
+        yield "3, 0."
+        weighed = f", DENSITY={density}" if density else ""
+        yield f"*SHELL GENERAL SECTION, ELSET=SHEET, ORIENTATION=SHEET_AXES{weighed}"
+    elif "pair" in result.coords:
+        matrix = result["stiffness"].values[np.ix_(SOLID, SOLID)]
+        yield "** A repeated sheet as a solid, made by Foldyn, in SI units, along the axes of space"
+        yield "*MATERIAL, NAME=SOLID"
+        if density:
+            yield from ("*DENSITY", density)
+        yield "*ELASTIC, TYPE=ANISOTROPIC"
+    else:
+        raise InputError(
+            ": of a chain or tube, which stretches and twists or bends at once, as no general "
+            "section of a beam does; give that of a sheet or solid",
+            "result",
+        )
+    half = np.concatenate([matrix[: k + 1, k] for k in range(6)])
+    for k in range(0, len(half), IN_A_LINE):
+        yield _line(half[k : k + IN_A_LINE])
+
+
+def _line(values: NDArray) -> str:
+    return ", ".join(f"{value:.12g}" for value in values.tolist())
