@@ -126,5 +126,5 @@ def test_a_file_says_its_own_analysis(tmp_path: Path):
     with pytest.raises(InputError, match=r"analysis: effective properties of a case file"):
         fd.sensitivity(path, parameters, measures="modulus[x]", analysis={"secant": 1.0})
     modes = {"kind": "modes", "count": 8}
-    found = fd.sensitivity(path, parameters, measures="frequency[1]", analysis=modes)
+    found = fd.sensitivity(path, parameters, measures="frequency[7]", analysis=modes)
     assert np.isfinite(found["gradient_pattern.dihedral"]).all()
