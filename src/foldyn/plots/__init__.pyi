@@ -10,7 +10,6 @@ from foldyn.plots.attractors import (
 )
 from foldyn.plots.bands import (
     plot_bands as plot_bands,
-    EFFECTIVE as EFFECTIVE,
     plot_effective as plot_effective,
     plot_iso_frequency as plot_iso_frequency,
 )
