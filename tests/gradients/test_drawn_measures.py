@@ -46,7 +46,8 @@ MOVING = [
 EXACT = ("oblique supports", "a rigid panel", "nodes linked")
 PEAKS = ["peak_frequency[8,z]", "peak_height[8,z]"]
 ELSEWHERE = {"clearance", "limit_load", "load_at", "barrier", "barrier_back"}
-"""Measures of paths that snap and of panels apart, in tests of their own."""
+ELSEWHERE |= {name for name, one in DERIVATIVES.items() if one.beside}
+"""Measures of paths that snap, of panels apart, and differenced ones, in tests of their own."""
 
 
 def drawn(tied: str, preset: Any, seed: int) -> tuple[Callable[..., fd.Case], dict[str, Any]]:
