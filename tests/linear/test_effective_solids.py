@@ -31,7 +31,8 @@ def test_a_honeycomb_of_thin_walls(model):
     np.testing.assert_allclose(found.density, 1000.0 * share, rtol=1e-12)
     np.testing.assert_allclose(found.modulus, [across, across, 1e9 * share], rtol=2e-3)
     np.testing.assert_allclose(found.poissons_ratio.sel(pair="xy"), 1.0, rtol=2e-3)
-    np.testing.assert_allclose(found.poissons_ratio.sel(pair="zx"), 0.0, atol=5e-4)
+    rough = 5e-4 if model == "superelements" else 5e-3  # walls are 5000 times as soft across
+    np.testing.assert_allclose(found.poissons_ratio.sel(pair="zx"), 0.0, atol=rough)
     np.testing.assert_allclose(found.shear_modulus.sel(plane="xy"), 0.25 * across, rtol=2e-3)
 
 
@@ -46,7 +47,6 @@ def test_long_waves_have_the_speeds_of_sound(model):
     """Of a wave along n the stiffness n . C . n (Christoffel) has the eigenvalues rho c^2."""
     cell = of_layers(model)
     found, phase = fd.effective(cell), 1e-3 * np.array([0.6, -0.3, 0.8])
-    stiffness = np.zeros((3, 3, 3, 3))
     voigt = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])
     stiffness = found.stiffness.values[voigt][:, :, voigt]
     wave = np.linalg.solve(cell.vectors, phase)  # rad/m

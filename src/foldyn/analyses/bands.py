@@ -16,7 +16,6 @@ import xarray
 from numpy.typing import NDArray
 
 from foldyn import plots
-from foldyn.analyses.bars import bar, bar_closed
 from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, counted
 from foldyn.analyses.cells import (
     CellSchema,
@@ -24,6 +23,7 @@ from foldyn.analyses.cells import (
     CellState,
     cell_states,
     coordinate,
+    in_all,
 )
 from foldyn.analyses.sections import Count, Text, whole_number
 from foldyn.arguments import Check
@@ -116,13 +116,7 @@ class BandsAnalysis(Analysis):
             path = cell.path(AROUND[cell.dimensions] if points is None else points, given["points"])
 
         def compute(progress: bool, begun: Begun) -> xarray.Dataset:
-            found = []
-            with bar_closed(bar(progress, total=len(states), desc="states")) as reached:
-                for state in states:
-                    with state.placed():
-                        found.append(_bands(state, path, given))
-                    begun()
-                    reached.update()
+            found = in_all(states, lambda state: _bands(state, path, given), progress, begun)
             return _joined(case_file.case(mass), states, found)
 
         return compute

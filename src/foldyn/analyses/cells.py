@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import Annotated, Any
+from typing import Annotated, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.analyses.casefile import CaseFile
+from foldyn.analyses.bars import bar, bar_closed
+from foldyn.analyses.casefile import Begun, CaseFile
 from foldyn.analyses.ranges import Varied, varied
 from foldyn.analyses.sections import AnalysisSection, Positive
 from foldyn.analyses.vibration import About, Secant, VibrationSchema, about
@@ -24,6 +25,7 @@ from foldyn.patterns.screw import Screw
 from foldyn.tables import TableOf
 from foldyn.values import indices, number, number_or_list, one_or_each, show
 
+R = TypeVar("R")
 MOST_STATES = 200
 ASIDE = ("analysis", "output", "sweep", "design", "title")
 """Tables that do not change the state."""
@@ -130,6 +132,20 @@ def cell_states(case_file: CaseFile, mass: str, given: Mapping[str, Any]) -> lis
             "vary",
         )
     return states
+
+
+def in_all(
+    states: Sequence[CellState], compute: Callable[[CellState], R], progress: bool, begun: Begun
+) -> list[R]:
+    """What a function finds in each state, with a progress bar."""
+    found = []
+    with bar_closed(bar(progress, total=len(states), desc="states")) as reached:
+        for state in states:
+            with state.placed():
+                found.append(compute(state))
+            begun()
+            reached.update()
+    return found
 
 
 def _cell(case: Case, given: Mapping[str, Any]) -> UnitCell:

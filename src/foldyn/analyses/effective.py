@@ -9,9 +9,8 @@ import numpy as np
 import xarray
 
 from foldyn import plots
-from foldyn.analyses.bars import bar, bar_closed
 from foldyn.analyses.casefile import Analysis, Begun, CaseFile, Compute, counted
-from foldyn.analyses.cells import CellSchema, CellSection, cell_states, coordinate
+from foldyn.analyses.cells import CellSchema, CellSection, cell_states, coordinate, in_all
 from foldyn.analyses.ranges import Varied
 from foldyn.cases import Case
 from foldyn.linear import effective
@@ -67,13 +66,9 @@ class EffectiveAnalysis(Analysis):
         states = cell_states(case_file, mass, {**self.arguments, **changes})
 
         def compute(progress: bool, begun: Begun) -> xarray.Dataset:
-            found = []
-            with bar_closed(bar(progress, total=len(states), desc="states")) as reached:
-                for state in states:
-                    with state.placed():
-                        found.append(effective(state.cell, **state.arguments()))
-                    begun()
-                    reached.update()
+            found = in_all(
+                states, lambda one: effective(one.cell, **one.arguments()), progress, begun
+            )
             vary = states[0].varied
             return found[0] if vary is None else _joined(case_file.case(mass), vary, found)
 

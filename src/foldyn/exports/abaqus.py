@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from foldyn.cases import Case
 from foldyn.exports.creased_shell import CreasedShell, write_deck
-from foldyn.exports.sections import section
+from foldyn.exports.sections import line, section
 from foldyn.structures import Ply, Sheet
 from foldyn.structures.ply import pair
 from foldyn.values import choice
@@ -71,7 +71,7 @@ def _deck(shell: CreasedShell, count: int, kind: str) -> Iterator[str]:
     yield "** other panels at the same place. Damping and histories play no part."
     yield f"*NODE, NSET={SHEET}"
     for number, point in enumerate(shell.nodes.tolist(), 1):
-        yield _line(number, *point)
+        yield line(number, *point)
     yield from _panels(shell, kind)
     yield from _ties(shell)
     yield from _creases(shell)
@@ -90,7 +90,7 @@ def _panels(shell: CreasedShell, kind: str) -> Iterator[str]:
         for k, part in enumerate(sheet.plies or [sheet], 1):
             yield f"*MATERIAL, NAME=MATERIAL_{_name(number, k if sheet.plies else 0)}"
             yield from _elastic(part)
-            yield from ("*DENSITY", _line(part.density))
+            yield from ("*DENSITY", line(part.density))
         # orthotropic panels are a section for each direction
         axes = np.round(shell.axes[own], ALIKE) if sheet.orthotropic else np.zeros((len(own), 2, 3))
         ways, way = np.unique(axes, axis=0, return_inverse=True)
@@ -100,7 +100,7 @@ def _panels(shell: CreasedShell, kind: str) -> Iterator[str]:
             for element, nodes in zip(
                 (some + 1).tolist(), (shell.triangles[some] + 1).tolist(), strict=True
             ):
-                yield _line(element, *nodes)
+                yield line(element, *nodes)
             yield from _section(sheet, number, name, both)
 
 
@@ -113,33 +113,33 @@ def _section(sheet: Sheet, number: int, name: str, axes: NDArray) -> Iterator[st
     """Thickness and material of a set of elements, with directions 1 and 2 (2, 3)."""
     section = f"*SHELL SECTION, ELSET=PANELS_{name}"
     if not sheet.orthotropic:
-        yield from (f"{section}, MATERIAL=MATERIAL_{number}", _line(sheet.thickness))
+        yield from (f"{section}, MATERIAL=MATERIAL_{number}", line(sheet.thickness))
         return
     angles = [math.radians(ply.angle) for ply in sheet.plies or ()] or [0.0]
     for k, angle in enumerate(angles, 1):
         c, s = math.cos(angle), math.sin(angle)
         turned = np.array([[c, s], [-s, c]]) @ axes
         yield f"*ORIENTATION, NAME=AXES_{_name(name, k if sheet.plies else 0)}"
-        yield from (_line(*turned.ravel().tolist()), _line(3, 0.0))
+        yield from (line(*turned.ravel().tolist()), line(3, 0.0))
     if sheet.plies:
         yield f"{section}, COMPOSITE"
         for k, ply in enumerate(sheet.plies, 1):
-            yield f"{_line(ply.thickness)}, 3, MATERIAL_{number}_{k}, AXES_{name}_{k}"
+            yield f"{line(ply.thickness)}, 3, MATERIAL_{number}_{k}, AXES_{name}_{k}"
     else:
         yield f"{section}, MATERIAL=MATERIAL_{number}, ORIENTATION=AXES_{name}"
-        yield _line(sheet.thickness)
+        yield line(sheet.thickness)
 
 
 def _elastic(part: Sheet | Ply) -> Iterator[str]:
     """Elastic constants; an orthotropic sheet has those of direction 2 along its normal, too."""
     first, second = pair(part.youngs_modulus)
     if part.shear_modulus is None:
-        yield from ("*ELASTIC", _line(first, part.poissons_ratio))
+        yield from ("*ELASTIC", line(first, part.poissons_ratio))
         return
     yield "*ELASTIC, TYPE=ENGINEERING CONSTANTS"
     shear = part.shear_modulus
-    yield _line(first, second, second, part.poissons_ratio, 0.0, 0.0, shear, shear)
-    yield _line(shear)
+    yield line(first, second, second, part.poissons_ratio, 0.0, 0.0, shear, shear)
+    yield line(shear)
 
 
 def _ties(shell: CreasedShell) -> Iterator[str]:
@@ -149,7 +149,7 @@ def _ties(shell: CreasedShell) -> Iterator[str]:
             for axis in np.flatnonzero(~shell.held[node]).tolist():
                 yield "*EQUATION"
                 yield "2"
-                yield _line(node + 1, axis + 1, 1.0, first + 1, axis + 1, -1.0)
+                yield line(node + 1, axis + 1, 1.0, first + 1, axis + 1, -1.0)
 
 
 def _creases(shell: CreasedShell) -> Iterator[str]:
@@ -159,7 +159,7 @@ def _creases(shell: CreasedShell) -> Iterator[str]:
     if len(pairs):
         yield "*NODE, NSET=TURNS"
         for number, point in enumerate(shell.nodes[pairs[:, 0]].tolist(), node + 1):
-            yield _line(number, *point)
+            yield line(number, *point)
     for crease, joint in enumerate(shell.joints, 1):
         turns = node + 1 + np.arange(len(joint.nodes))
         for turn, (first, second) in zip(turns.tolist(), (joint.nodes + 1).tolist(), strict=True):
@@ -168,9 +168,9 @@ def _creases(shell: CreasedShell) -> Iterator[str]:
             own = joint.stiffness == stiffness
             yield f"*ELEMENT, TYPE=SPRING1, ELSET=SPRINGS_{crease}_{part}"
             for number, turn in enumerate(turns[own].tolist(), element + 1):
-                yield _line(number, turn)
+                yield line(number, turn)
             yield f"*SPRING, ELSET=SPRINGS_{crease}_{part}"
-            yield from ("1", _line(stiffness))
+            yield from ("1", line(stiffness))
             element += int(own.sum())
         node += len(turns)
 
@@ -187,37 +187,30 @@ def _turn(turn: int, first: int, second: int, axis: NDArray) -> Iterator[str]:
     yield f"{len(terms) + 1}"
     rows = [(turn, 1, 1.0), *terms]
     for k in range(0, len(rows), 4):
-        yield _line(*chain.from_iterable(rows[k : k + 4]))
+        yield line(*chain.from_iterable(rows[k : k + 4]))
 
 
 def _masses(shell: CreasedShell) -> Iterator[str]:
     element = len(shell.triangles) + sum(len(joint.nodes) for joint in shell.joints)
     for number, node in enumerate(np.flatnonzero(shell.masses).tolist(), 1):
         yield f"*ELEMENT, TYPE=MASS, ELSET=MASS_{number}"
-        yield _line(element + number, node + 1)
-        yield from (f"*MASS, ELSET=MASS_{number}", _line(float(shell.masses[node])))
+        yield line(element + number, node + 1)
+        yield from (f"*MASS, ELSET=MASS_{number}", line(float(shell.masses[node])))
 
 
 def _supports(shell: CreasedShell) -> Iterator[str]:
     yield "*BOUNDARY"
     if shell.joints:
-        yield _line("TURNS", 2, 3)
+        yield line("TURNS", 2, 3)
     for node, held in enumerate(shell.held.tolist(), 1):
-        yield from (_line(node, axis, axis) for axis in range(1, 4) if held[axis - 1])
-    yield from (_line(node + 1, 4, 6) for node in np.flatnonzero(shell.clamped).tolist())
+        yield from (line(node, axis, axis) for axis in range(1, 4) if held[axis - 1])
+    yield from (line(node + 1, 4, 6) for node in np.flatnonzero(shell.clamped).tolist())
 
 
 def _statics(shell: CreasedShell) -> Iterator[str]:
     """All loads at full value, in increments that the program chooses; print displacements."""
-    yield from ("*STEP, NLGEOM, INC=1000", "*STATIC", _line(0.1, 1.0), "*CLOAD")
+    yield from ("*STEP, NLGEOM, INC=1000", "*STATIC", line(0.1, 1.0), "*CLOAD")
     force = np.sum(shell.forces, axis=0)
     for node, axis in np.argwhere(force).tolist():
-        yield _line(node + 1, axis + 1, float(force[node, axis]))
+        yield line(node + 1, axis + 1, float(force[node, axis]))
     yield from (f"*NODE PRINT, NSET={SHEET}", "U", "*END STEP")
-
-
-def _line(*values: Any) -> str:
-    """A line of data, in numbers of at most 20 columns."""
-    return ", ".join(
-        f"{value:.12g}" if isinstance(value, float) else str(value) for value in values
-    )

@@ -7,10 +7,10 @@ material, too; it expands shells to solids, and has no section with a stiffness 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 import xarray
-from numpy.typing import NDArray
 
 from foldyn.errors import InputError
 
@@ -28,7 +28,7 @@ def section(result: xarray.Dataset) -> Iterator[str]:
     """
     if "state" in result.dims:
         raise InputError(": has several states; choose one, as result.isel(state=0)", "result")
-    density = f"{result['density'].item():.12g}" if "density" in result else ""
+    density = line(result["density"].item()) if "density" in result else ""
     if "membrane" in result:
         coupling = result["coupling"].values
         matrix = np.block(
@@ -37,7 +37,7 @@ def section(result: xarray.Dataset) -> Iterator[str]:
         yield "** A repeated sheet as a plate, made by Foldyn, in SI units. Elements lie in the"
         yield "** plane of its center of mass. Shells that shear need *TRANSVERSE SHEAR STIFFNESS."
         yield "*ORIENTATION, NAME=SHEET_AXES"
-        yield _line(result["frame"].values[:2].ravel())
+        yield line(*result["frame"].values[:2].ravel().tolist())
         yield "3, 0."
         weighed = f", DENSITY={density}" if density else ""
         yield f"*SHELL GENERAL SECTION, ELSET=SHEET, ORIENTATION=SHEET_AXES{weighed}"
@@ -54,10 +54,13 @@ def section(result: xarray.Dataset) -> Iterator[str]:
             "section of a beam does; give that of a sheet or solid",
             "result",
         )
-    half = np.concatenate([matrix[: k + 1, k] for k in range(6)])
+    half = np.concatenate([matrix[: k + 1, k] for k in range(6)]).tolist()
     for k in range(0, len(half), IN_A_LINE):
-        yield _line(half[k : k + IN_A_LINE])
+        yield line(*half[k : k + IN_A_LINE])
 
 
-def _line(values: NDArray) -> str:
-    return ", ".join(f"{value:.12g}" for value in values.tolist())
+def line(*values: Any) -> str:
+    """A line of data, in numbers of at most 20 columns."""
+    return ", ".join(
+        f"{value:.12g}" if isinstance(value, float) else str(value) for value in values
+    )

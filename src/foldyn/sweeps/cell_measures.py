@@ -103,7 +103,7 @@ PROPERTIES = {
         units,
         doc,
         takes=takes,
-        needs=len(takes[:1]) * (takes != ("plane",)),
+        needs=0 if takes in ((), ("plane",)) else 1,
     )
     for takes, rows in {
         ("pair",): (
@@ -138,7 +138,7 @@ PROPERTIES = {
     }.items()
     for name, units, doc in rows
 }
-"""Measures of the equivalent plate or beam by name."""
+"""Measures of the equivalent plate, beam or solid by name."""
 OF_CELLS |= PROPERTIES
 
 
