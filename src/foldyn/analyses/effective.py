@@ -14,7 +14,7 @@ from foldyn.analyses.cells import CellSchema, CellSection, cell_states, coordina
 from foldyn.analyses.ranges import Varied
 from foldyn.cases import Case
 from foldyn.linear import effective
-from foldyn.plots.bands import EFFECTIVE
+from foldyn.linear.cell_equilibrium import BY_STATE
 from foldyn.report.album import Album, ByRule
 from foldyn.report.sections import Heading, Section, Table, Text, cell
 from foldyn.results.dataset import result_dataset
@@ -142,7 +142,7 @@ def _joined(case: Case, vary: Varied, found: Sequence[xarray.Dataset]) -> xarray
 
 def _by_state(result: xarray.Dataset) -> Table:
     """The short variables, a row for each state."""
-    shown = [str(name) for name in EFFECTIVE if name in result]
+    shown = [str(name) for name in BY_STATE if name in result]
     rows = [
         [cell(float(state)), *(_listed(result[name].sel(state=state)) for name in shown)]
         for state in result["state"].values

@@ -203,7 +203,7 @@ def source_of(build: Source, parameters: Any, analysis: Mapping[str, Any] | None
         build, values = _of_arrays(build, parameters)
     elif isinstance(build, str | os.PathLike):
         build, values, own = _of_file(build, parameters, analysis)
-        analysis = {**own, **of_kind("analysis", {} if analysis is None else analysis, Mapping)}
+        analysis = {**own, **(analysis or {})}
     elif callable(build):
         values = checked(parameters)
     else:
@@ -322,6 +322,7 @@ def _of_file(
     path: str | os.PathLike[str], parameters: Any, analysis: Mapping[str, Any] | None
 ) -> tuple[Callable[..., Case], dict[str, NDArray], dict[str, Any]]:
     """A function that returns the case for other values of keys, the values, and the analysis."""
+    of_kind("analysis", {} if analysis is None else analysis, Mapping)
     place = path_of(path, "build")
     document = read_document(place)
 

@@ -27,6 +27,12 @@ from foldyn.values import listed, number, of_kind, vector, whole
 ITERATIONS = 40
 HALVINGS = 12
 NULL = 1e-11  # stiffnesses below this, relative to the largest, count as zero
+BY_STATE = (
+    "poissons_ratio", "bending_poissons_ratio", "modulus", "bending_modulus", "shear_modulus",
+    "twisting_modulus", "axial_stiffness", "torsional_stiffness", "bending_stiffness",
+    "stretch_twist", "density", "mean_force", "mean_load",
+)  # fmt: skip
+"""Properties of cells that are drawn and listed by state."""
 
 
 def relaxed(

@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 
 from foldyn.errors import InputError
 from foldyn.linear.band_structure import ALL, band_gaps, frequencies_of
+from foldyn.linear.cell_equilibrium import BY_STATE
 from foldyn.plots import style
 from foldyn.values import flag, whole
 
@@ -140,14 +141,6 @@ def _along(bands: xr.Dataset) -> tuple[np.ndarray, str]:
     raise InputError(": its phases lie on no path; use cell.path, or plot_iso_frequency", "bands")
 
 
-EFFECTIVE = (
-    "poissons_ratio", "bending_poissons_ratio", "modulus", "bending_modulus", "shear_modulus",
-    "twisting_modulus", "axial_stiffness", "torsional_stiffness", "bending_stiffness",
-    "stretch_twist", "density", "mean_force", "mean_load",
-)  # fmt: skip
-"""Effective properties that are drawn and listed by state."""
-
-
 def plot_effective(effective: xr.Dataset, *, title: str = "") -> Figure:
     """Draw moduli of stretching and bending along all directions in a sheet, or all its states.
 
@@ -162,7 +155,7 @@ def plot_effective(effective: xr.Dataset, *, title: str = "") -> Figure:
     -------
     matplotlib.figure.Figure
         A polar diagram of each, with the angle from the axis x; of several states, what is in
-        `EFFECTIVE` against the varied key.
+        `BY_STATE` against the varied key.
 
     Raises
     ------
@@ -192,7 +185,7 @@ def with_unit(values: xr.DataArray) -> str:
 
 def _draw_states(effective: xr.Dataset, title: str) -> Figure:
     """Draw the short variables against the states, each in its axes."""
-    shown = [name for name in EFFECTIVE if name in effective]
+    shown = [name for name in BY_STATE if name in effective]
     state, rows = effective["state"], -(-len(shown) // 2)
     figure = style.new_figure(7.2, 2.2 * rows + 0.3, title)
     for k, (name, axes) in enumerate(zip(shown, figure.subplots(rows, 2).flat, strict=False)):
