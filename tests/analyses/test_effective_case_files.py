@@ -155,3 +155,15 @@ def test_the_mean_force_grows_with_the_stiffness_of_its_states(tmp_path):
     slope = np.diff(found.mean_force.sel(load=["xx", "yy"]).values[::2], axis=0)[0] / 2e-4
     stiffness = found.membrane.sel(load=["xx", "yy"], strain="xx").values[1]
     np.testing.assert_allclose(slope, stiffness, rtol=1e-3)
+
+
+@pytest.mark.matrix
+def test_states_that_are_unstable_are_hollow(tmp_path):
+    text = SHEET.replace("dihedral = 100", "dihedral = 180") + "stretch = [1.0, 1.0]\n"
+    text += 'vary = { "analysis.stretch[0]" = [0.999, 1.0] }\n'
+    with pytest.warns(fd.errors.FoldynWarning, match="mean forces|unstable"):
+        found = fd.read_case(written(tmp_path, text)).run()
+    assert found.stable.values.tolist() == [False, True]
+    _, hollow = fd.plots.plot_effective(found).axes[0].lines[:2]
+    assert hollow.get_xdata().tolist() == [0.999]
+    assert hollow.get_markerfacecolor() == "white"

@@ -98,10 +98,46 @@ def test_a_solid_is_a_material_of_calculix(tmp_path: Path):
     np.testing.assert_allclose(moved, [strain, *(-ratios * strain)], rtol=1e-5)
 
 
+def angle_section() -> fd.UnitCell:
+    """Legs of 50 and 30 mm along x and z, welded; the second is three times as stiff."""
+    across = [(0.0, 0.0), (0.05, 0.0), (0.0, 0.03)]
+    vertices = [(x, y, z) for y in (0.0, 0.02) for x, z in across]
+    pattern = fd.Pattern(vertices, [(0, 1, 4, 3), (0, 3, 5, 2)], welds=[(0, 3)])
+    sheet = fd.Sheet(1e9, 0.0, 1e-4, 1000.0, panels=[fd.PanelSheet([1], 3e9)])
+    shell = fd.shell(pattern, sheet, divisions=24, crease_stiffness=1.0)
+    return fd.UnitCell(fd.Case(shell), vectors=[(0.0, 0.02, 0.0)])
+
+
+@pytest.mark.matrix
+def test_a_beam_is_a_general_section(tmp_path: Path):
+    """Its numbers are sums over the fibers of its legs, from the line of its center of mass."""
+    found = fd.effective(angle_section())
+    (path,) = fd.export(found, tmp_path / "beam.inp")
+    lines = [row for row in path.read_text().splitlines() if not row.startswith("**")]
+    assert lines[0].startswith("*BEAM GENERAL SECTION") and lines[4] == "*CENTROID"
+    section, first, moduli, offset = (np.array(lines[k].split(","), float) for k in (1, 2, 3, 5))
+    along = (np.arange(500) + 0.5) / 500
+    legs = np.concatenate([np.outer(along, (0.05, 0, 0)), np.outer(along, (0, 0, 0.03))])
+    stiff = np.repeat([1e9 * 0.05, 3e9 * 0.03], 500) * 1e-4 / 500
+    mass = np.repeat([0.05, 0.03], 500)
+    axis = found.frame[0].values
+    axes = np.array([first, np.cross(axis, first)])  # right-handed with the beam's direction
+    place = (legs - mass @ legs / mass.sum()) @ axes.T
+    middle = stiff @ place / stiff.sum()
+    np.testing.assert_allclose(offset, middle, rtol=1e-4)
+    one, two = (place - middle).T
+    sums = [stiff.sum(), stiff @ two**2, stiff @ (one * two), stiff @ one**2]
+    np.testing.assert_allclose(section[:4], sums, rtol=3e-3)
+    assert section[4] == pytest.approx(found.torsional_stiffness.item(), rel=1e-9)
+    assert moduli.tolist() == [1.0, 1.0]
+    density = float(lines[0].split("DENSITY=")[1])
+    assert density * section[0] == pytest.approx(1000.0 * 1e-4 * 0.08, rel=1e-9)
+
+
 def test_what_is_no_section_is_refused(tmp_path: Path):
     tower = fd.discretize(fd.patterns.kresling(), SHEET, crease_stiffness=0.01)
     chain = fd.effective(fd.UnitCell(fd.Case(tower)))
-    with pytest.raises(InputError, match="of a chain or tube"):
+    with pytest.raises(InputError, match="of a chain or tube that twists"):
         fd.export(chain, tmp_path / "tower.inp")
     one = fd.effective(plate())
     states = one.assign(membrane=one["membrane"].expand_dims("state"))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 from dataclasses import replace
 
 import numpy as np
@@ -305,6 +306,34 @@ def test_states_with_mean_forces_and_unstable_ones_are_told():
     with pytest.warns(FoldynWarning, match="mean forces|unstable") as told:
         effective(pressed, fd.linear.relaxed(pressed, 0.999 * pressed.vectors))
     assert any("the state is unstable" in str(each.message) for each in told)
+
+
+def test_a_pressed_sheet_buckles_in_the_waves_of_the_plate():
+    """Of D k^4 + N k^2 < 0, although a cell alone is stable."""
+    cell = fd.UnitCell(fd.Case(fd.discretize(fd.patterns.miura(dihedral=180.0), SHEET)))
+    state = fd.linear.relaxed(cell, cell.vectors @ np.diag([1.0 - 2e-9, 1.0, 1.0]))
+    found = effective(cell, state)
+    assert found.stable
+    number = np.sqrt(-found.mean_force[0] / found.bending[0, 0])
+    phases = float(number) * cell.vectors[0, 0] * np.array([[0.99, 0.0], [1.01, 0.0]])
+    assert phases.max() < 0.2 * np.pi
+    with pytest.warns(FoldynWarning, match="unstable"):
+        longer, shorter = fd.bands(cell, phases, count=1, state=state).eigenvalue[:, 0]
+    assert longer < 0.0 < shorter
+
+
+def test_a_state_takes_few_factorizations(monkeypatch):
+    """Of the largest number that is asked, 5: one for the waves of a cell, one for its strains."""
+    factorized = []
+
+    def counted(matrix, *args, **options):
+        factorized.append(matrix.shape)
+        return splu(matrix, *args, **options)
+
+    for name in ("effective", "wave_solver"):
+        monkeypatch.setattr(importlib.import_module(f"foldyn.linear.{name}"), "splu", counted)
+    effective(fd.UnitCell(fd.Case(fd.discretize(fd.patterns.miura(cells=(2, 3)), SHEET))))
+    assert 1 <= len(factorized) <= 5
 
 
 # ---------------------------------------------------------------------- beams

@@ -94,7 +94,7 @@ class EffectiveAnalysis(Analysis):
         if several or "angle" in result.coords:
             yield Heading("States" if several else "Directions")
             yield from album.figure(
-                "effective", "Properties in each state." if several else
+                "effective", "Properties by state, hollow where it is unstable." if several else
                 "Moduli of stretching and bending along directions in the sheet.",
                 lambda: plots.plot_effective(result),
             )  # fmt: skip
@@ -144,11 +144,16 @@ def _by_state(result: xarray.Dataset) -> Table:
     """The short variables, a row for each state."""
     shown = [str(name) for name in BY_STATE if name in result]
     rows = [
-        [cell(float(state)), *(_listed(result[name].sel(state=state)) for name in shown)]
+        [
+            cell(float(state)),
+            *(_listed(result[name].sel(state=state)) for name in shown),
+            "yes" if result["stable"].sel(state=state) else "no",
+        ]
         for state in result["state"].values
     ]
     units = [f"{name.replace('_', ' ')} ({result[name].units})" for name in shown]
-    return Table([result["state"].attrs["long_name"], *units], rows, "Properties in each state")
+    names = [result["state"].attrs["long_name"], *units, "stable"]
+    return Table(names, rows, "Properties in each state")
 
 
 def _listed(values: xarray.DataArray) -> str:

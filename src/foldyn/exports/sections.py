@@ -1,4 +1,4 @@
-"""Abaqus: a sheet that repeats as the section of a shell, or as the material of a solid.
+"""Abaqus: a sheet that repeats as the section of a shell or beam, or as the material of a solid.
 
 Keywords and the order of the numbers follow the Abaqus Keywords Reference Guide. CalculiX reads the
 material, too; it expands shells to solids, and has no section with a stiffness of its own.
@@ -16,6 +16,7 @@ from foldyn.errors import InputError
 
 IN_A_LINE = 8
 SOLID = [0, 1, 2, 5, 4, 3]  # 11, 22, 33, 12, 13, 23 in the order of `effective`
+COUPLED = 1e-6  # of twist with the rest, relative to the diagonal: a smaller one is round-off
 
 
 def section(result: xarray.Dataset) -> Iterator[str]:
@@ -24,7 +25,7 @@ def section(result: xarray.Dataset) -> Iterator[str]:
     Raises
     ------
     InputError
-        A chain or tube, or several states.
+        A chain or tube that twists when it is stretched or bent, or several states.
     """
     if "state" in result.dims:
         raise InputError(": has several states; choose one, as result.isel(state=0)", "result")
@@ -49,14 +50,33 @@ def section(result: xarray.Dataset) -> Iterator[str]:
             yield from ("*DENSITY", density)
         yield "*ELASTIC, TYPE=ANISOTROPIC"
     else:
-        raise InputError(
-            ": of a chain or tube, which stretches and twists or bends at once, as no general "
-            "section of a beam does; give that of a sheet or solid",
-            "result",
-        )
+        yield from _beam(result, density)
+        return
     half = np.concatenate([matrix[: k + 1, k] for k in range(6)]).tolist()
     for k in range(0, len(half), IN_A_LINE):
         yield line(*half[k : k + IN_A_LINE])
+
+
+def _beam(result: xarray.Dataset, density: str) -> Iterator[str]:
+    """Lines of the section of a beam, for moduli of 1 Pa: its areas are stiffnesses."""
+    stiffness, frame = result["stiffness"].values, result["frame"].values
+    size = np.sqrt(np.diag(stiffness))
+    if (np.abs(stiffness[1]) > COUPLED * size[1] * size)[[0, 2, 3]].any():
+        raise InputError(
+            ": of a chain or tube that twists when it is stretched or bent, which no general "
+            "section of a beam does; use the numbers of its stiffness in a program that does",
+            "result",
+        )
+    area, _, up, across = stiffness[0]
+    bending = stiffness[2:, 2:] - np.outer(stiffness[2:, 0], stiffness[0, 2:]) / area
+    yield "** A repeated chain or tube as a beam, made by Foldyn, in SI units. Nodes lie on the"
+    yield "** line through its center of mass."
+    weighed = f", DENSITY={line(result['density'].item() / area)}" if density else ""
+    yield f"*BEAM GENERAL SECTION, ELSET=BEAM, SECTION=GENERAL{weighed}"
+    yield line(area, bending[0, 0], -bending[0, 1], bending[1, 1], stiffness[1, 1])
+    yield line(*frame[1].tolist())
+    yield "1., 1."
+    yield from ("*CENTROID", line(-across / area, up / area))
 
 
 def line(*values: Any) -> str:

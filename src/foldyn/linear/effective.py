@@ -101,7 +101,7 @@ def effective(
         counted twice, along the axes of space; `modulus` (direction) and `shear_modulus` (plane),
         Pa; `poissons_ratio` (pair): of "xy", minus the strain along y divided by that along x,
         under a stress along x; `density` (kg/m3). Of all `mean_load`, forces, moments or stresses
-        in the state, and its variables as in `bands`.
+        in the state, whether that is `stable`, and its variables as in `bands`.
 
     Raises
     ------
@@ -146,8 +146,8 @@ def effective(
     frame, size = kind.frame(linear)
     whole, loads = kind.stiffness(linear, energy, frame)
     matrix = whole / size
-    _warn_of(linear, kind, matrix, loads / size)
-    found = kind.properties(matrix, loads / size)
+    stable = _warn_of(linear, kind, matrix, loads / size)
+    found = kind.properties(matrix, loads / size) | {"stable": ((), stable, {})}
     if weighed:
         found["density"] = (), energy.mass.sum() / size, {"units": kind.density}
     found["center"] = "axis", energy.center, {"units": "m"}
@@ -254,8 +254,8 @@ def _solid(linear: LinearizedCell, energy: CellEnergy, frame: NDArray) -> tuple[
     return energy.stiffness(strains, np.zeros(3), still), energy.loads(strains)
 
 
-def _warn_of(linear: LinearizedCell, kind: Equivalent, matrix: NDArray, loads: NDArray) -> None:
-    """Warn of an unstable state, of strains without stiffness, and of mean forces."""
+def _warn_of(linear: LinearizedCell, kind: Equivalent, matrix: NDArray, loads: NDArray) -> bool:
+    """Whether the state is stable; warn if not, of strains without stiffness, of mean forces."""
     names, straight, size = kind.names, kind.straight, linear.cell.case.structure.pattern.size
     unit = np.where(np.arange(len(names)) < straight, 1.0, size)  # of curvatures, and twists
     stiff = np.abs(np.diag(matrix)) / unit**2
@@ -264,7 +264,8 @@ def _warn_of(linear: LinearizedCell, kind: Equivalent, matrix: NDArray, loads: N
     scale = unit * np.sqrt(stiffest)
     values, ways = np.linalg.eigh(matrix / np.outer(scale, scale))
     lowest = WaveSolver(linear.bloch, 1).waves(np.zeros(len(linear.motions))).values[0]
-    if lowest < 0.0 or values[0] < -SOFT * values[-1]:
+    stable = bool(lowest >= 0.0 and values[0] >= -SOFT * values[-1])
+    if not stable:
         warn(
             "the state is unstable: the cell moves away from it by itself, and the stiffness is "
             "that of small motions about it; give a stable state",
@@ -289,6 +290,7 @@ def _warn_of(linear: LinearizedCell, kind: Equivalent, matrix: NDArray, loads: N
             "these loads",
             "effective.md#states",
         )
+    return stable
 
 
 # ---------------------------------------------------------------------- properties

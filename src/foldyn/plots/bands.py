@@ -187,12 +187,14 @@ def _draw_states(effective: xr.Dataset, title: str) -> Figure:
     """Draw the short variables against the states, each in its axes."""
     shown = [name for name in BY_STATE if name in effective]
     state, rows = effective["state"], -(-len(shown) // 2)
+    unstable = np.flatnonzero(~effective["stable"].values)
     figure = style.new_figure(7.2, 2.2 * rows + 0.3, title)
     for k, (name, axes) in enumerate(zip(shown, figure.subplots(rows, 2).flat, strict=False)):
         own = effective[name].transpose("state", ...)
         labels = own[own.dims[1]].values if own.ndim > 1 else [""]
         for label, values in zip(labels, own.values.reshape(len(state), -1).T, strict=True):
-            axes.plot(state.values, values, "o-", lw=1.4, ms=2.5, label=label)
+            (line,) = axes.plot(state.values, values, "o-", lw=1.4, ms=2.5, label=label)
+            axes.plot(state[unstable], values[unstable], "o", ms=5, mfc="white", c=line.get_color())
         words = name.replace("poissons", "Poisson's").replace("_", " ")
         axes.set_title(f"{words}{with_unit(own)}", fontsize="medium")
         if own.ndim > 1:
