@@ -354,6 +354,7 @@ def solved(folder: Path) -> Calls:
         "mac": (fd.mac, {"a": found, "b": found, "mass": [1.0, 2.0], "nodes": [4, 5]}),
         "case_of": (fd.case_of, {"ds": run}),
         "latched": (fd.latched, {"result": run}),
+        "attitude": (fd.attitude, {"result": run, "panel": 0}),
         "save": (fd.save, {"ds": run, "path": folder / "again.nc"}),
         "load": (fd.load, {"path": folder / "run.nc", "whole": True}),
         "export": (fd.export, {"result": run, "path": folder / "run.csv", "format": None}),

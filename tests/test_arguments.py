@@ -53,10 +53,10 @@ SOLVED = (
     "simulate", "simulate_many", "trace", "switch_branch", "landscape", "modes", "buckling", "frf",
     "random_response", "spectrum_response", "stresses", "margins", "imperfect", "bands",
     "effective", "swept_sine", "bifurcation_diagram", "poincare_section", "lyapunov_exponent",
-    "basins", "fold", "critical_step", "initial_state", "mac", "case_of", "latched", "save", "load",
-    "export", "view", "read_case", "flat_foldable", "read_pattern", "diagnose", "write_pattern",
-    "sweep", "sensitivity", "design", "fit", "fidelity", "periodic_motion", "response_curve",
-    "backbone",
+    "basins", "fold", "critical_step", "initial_state", "mac", "case_of", "latched", "attitude",
+    "save", "load", "export", "view", "read_case", "flat_foldable", "read_pattern", "diagnose",
+    "write_pattern", "sweep", "sensitivity", "design", "fit", "fidelity", "periodic_motion",
+    "response_curve", "backbone",
 )  # fmt: skip
 """Calls of `solved`, which computes."""
 NAMES = (*DATA, *PATTERNS, *SOLVED)

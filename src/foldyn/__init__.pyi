@@ -120,6 +120,7 @@ from foldyn.periodic import (
 )
 from foldyn.results import (
     Quantity as Quantity,
+    attitude as attitude,
     case_of as case_of,
     latched as latched,
     load as load,

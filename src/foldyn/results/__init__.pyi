@@ -21,6 +21,7 @@ from foldyn.results.frames import (
     shapes_of as shapes_of,
     state_of as state_of,
 )
+from foldyn.results.free_flight import attitude as attitude
 from foldyn.results.netcdf import load as load, save as save
 from foldyn.results.quantities import Quantity as Quantity
 from foldyn.results.sweep_dataset import (
