@@ -157,8 +157,7 @@ def _character(case_file: CaseFile, modes: xarray.Dataset, case: Case) -> xarray
 
 def _judged(case_file: CaseFile, names: xarray.Dataset) -> str:
     """Text for a caption on how modes were named."""
-    nodes = case_file.output.nodes.tolist()
-    of = f" of {listed('node', nodes)}" if case_file.output.named else ""
+    of = f" of {listed('node', case_file.output.nodes.tolist())}" if case_file.output.named else ""
     return f"named by the largest share of their motion{of}, seen along {names.attrs['axis']}"
 
 

@@ -150,9 +150,7 @@ class PathAnalysis(Analysis):
     kind = "statics"
     moving = True
     schema = PathSchema
-    files = (
-        "reaction", "curve", "energies", "landscape", "shapes", "path.gif", "path.mp4", *FILES,
-    )  # fmt: skip
+    files = ("reaction", "curve", "energies", "landscape", "shapes", "path.gif", "path.mp4", *FILES)
     needs_density = ""
     takes = (*arguments_of(trace), *SETTINGS)
 
@@ -165,8 +163,7 @@ class PathAnalysis(Analysis):
             check_stresses(case, "output.stresses")
         if until is not None:
             resolve_nodes(case.structure, (until.node,), "analysis.until.node")
-        settings = Settings(**{name: given.pop(name) for name in SETTINGS})
-        return cls({**given, "settings": settings})
+        return cls({**given, "settings": Settings(**{name: given.pop(name) for name in SETTINGS})})
 
     def prepare(self, case_file: CaseFile, mass: str, changes: Mapping[str, Any]) -> Compute:
         """See `Analysis`; bad input, such as a mechanism, is refused before the first point."""
@@ -404,5 +401,4 @@ def _run(case_file: CaseFile, path: xarray.Dataset) -> Table:
         "tolerance": path.attrs["tolerance"],
         "time (s)": path.attrs["wall_seconds"],
     }
-    caption = f"{case_file.path.name}: the run"
-    return Table(list(cells), [list(cells.values())], caption, digits=3)
+    return Table(list(cells), [list(cells.values())], f"{case_file.path.name}: the run", digits=3)

@@ -293,8 +293,7 @@ class Loaded:
         for place, load in self._loads():
             own = load.swelling(self.structure, place)
             if own is not None:
-                forces = self._following(load, place)
-                found.append((own._replace(forces=forces), load.history))
+                found.append((own._replace(forces=self._following(load, place)), load.history))
         return tuple(found)
 
     @cached_property

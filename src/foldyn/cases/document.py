@@ -375,9 +375,7 @@ def _resolve(value: Any, arrays: Mapping[str, NDArray]) -> Any:
                 raise InputError(f"the stored case lacks its array {value['array']}")
             return arrays[value["array"]]
         return {key: _resolve(item, arrays) for key, item in value.items()}
-    if isinstance(value, list):
-        return [_resolve(item, arrays) for item in value]
-    return value
+    return [_resolve(item, arrays) for item in value] if isinstance(value, list) else value
 
 
 def _material(given: Mapping[str, Any]) -> dict[str, Any]:

@@ -136,8 +136,7 @@ class BarsHingesTerm(SheetTerm):
         """Largest turn of a hinge, or of a bar relative to the other bars; inf on penetration."""
         shift, (a, b) = self._nodal(other - q), self.model.bars.T
         apart = np.linalg.norm(shift[b] - shift[a], axis=1)
-        length = np.linalg.norm(self.model.bar_vector, axis=1)
-        bars = float((apart / length).max(initial=0.0))
+        bars = float((apart / np.linalg.norm(self.model.bar_vector, axis=1)).max(initial=0.0))
         return largest_turn(bars, self.angles(q), self.angles(other))
 
     def scale(self) -> NDArray:
@@ -174,8 +173,7 @@ class BarsHingesTerm(SheetTerm):
         angle, found = dihedrals_and_gradients(place, np.ascontiguousarray(model.hinges[rows]))
         start = 12 * np.arange(len(rows) + 1)
         gradient = sparse.csr_array((found.ravel(), columns.ravel(), start), (len(rows), self.size))
-        offset = angle - model.hinge_rest[rows]
-        return SoftHinges(offset, model.hinge_stiffness[rows], gradient)
+        return SoftHinges(angle - model.hinge_rest[rows], model.hinge_stiffness[rows], gradient)
 
     def soft_tangent(self, q: NDArray, slope: NDArray) -> sparse.csr_array:
         """Tangent (m, m) of the superlinear hinges alone; see `SheetTerm`."""
@@ -246,10 +244,9 @@ class BarsHingesTerm(SheetTerm):
             if law.follows_rest:
                 parameters[self._turning[part]] = law.parameters(rest[part])
             start += count
-        model = self.model._replace(
-            hinge_rest=angle, hinge_parameters=parameters, hinge_offset=offset
+        return self._with(
+            self.model._replace(hinge_rest=angle, hinge_parameters=parameters, hinge_offset=offset)
         )
-        return self._with(model)
 
     def actuated(self, numbers: NDArray) -> tuple[BarsHingesTerm, NDArray, NDArray]:
         """A copy with rest angles that change in place; see `SheetTerm`."""
@@ -283,8 +280,7 @@ class BarsHingesTerm(SheetTerm):
             return self, np.arange(self.rows)
         order = node_order(self.model)
         model, rows = renumber(self.model, order)
-        turning = ranks(rows)[self._turning]
-        return BarsHingesTerm(model, turning, self._laws, self._softness), order
+        return BarsHingesTerm(model, ranks(rows)[self._turning], self._laws, self._softness), order
 
     def hinges_alone(self) -> BarsHingesTerm:
         """The sheet with its hinges only; see `SheetTerm`."""

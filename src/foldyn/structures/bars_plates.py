@@ -158,8 +158,7 @@ class BarsPlatesTerm(SheetTerm):
         if len(self.model.bars.bar_runs):
             data[pattern.bars] = bars().data
         add_plates_tangent(self.model, pattern, *self._split(q), floor, data)
-        entries = (data, pattern.indices, pattern.indptr)
-        return sparse.csr_array(entries, (self.size, self.size))
+        return sparse.csr_array((data, pattern.indices, pattern.indptr), (self.size, self.size))
 
     def blocks(self) -> SparseBlocks:
         """See `SheetTerm`."""
@@ -279,9 +278,8 @@ class BarsPlatesTerm(SheetTerm):
             first = np.where(turns[:, 0] >= 0, turns[:, 0], turns[:, 1])
             turns, per_hidden = np.stack([first, first], axis=1), -0.5 * per_hidden
         hidden = np.where(turns >= 0, self._nodal + turns, NO_DOF)
-        corners = self.model.bars.rest[nodes]
         return FoldHinges(
-            np.arange(len(nodes)), nodes, corners, hidden, per_hidden,
+            np.arange(len(nodes)), nodes, self.model.bars.rest[nodes], hidden, per_hidden,
             self.model.fold_rest, self.model.fold_stiffness, np.zeros(len(nodes)),
             np.arange(len(nodes)),
         )  # fmt: skip
@@ -324,12 +322,11 @@ class BarsPlatesTerm(SheetTerm):
         plates = np.array(
             [lowest[model.angle[a:b]].min(initial=1) for a, b in pairwise(model.start)]
         )
-        entries = np.repeat(plates == 0, np.diff(model.entry))
         return self._with(
             model._replace(
                 bars=self._bars.anchored(place).model,
                 fold_stiffness=model.fold_stiffness * (lowest[: len(model.fold_rest)] == 0),
-                stiffness=model.stiffness * entries,
+                stiffness=model.stiffness * np.repeat(plates == 0, np.diff(model.entry)),
             )
         )
 
