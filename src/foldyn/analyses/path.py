@@ -163,7 +163,8 @@ class PathAnalysis(Analysis):
             check_stresses(case, "output.stresses")
         if until is not None:
             resolve_nodes(case.structure, (until.node,), "analysis.until.node")
-        return cls({**given, "settings": Settings(**{name: given.pop(name) for name in SETTINGS})})
+        settings = Settings(**{name: given.pop(name) for name in SETTINGS})
+        return cls({**given, "settings": settings})
 
     def prepare(self, case_file: CaseFile, mass: str, changes: Mapping[str, Any]) -> Compute:
         """See `Analysis`; bad input, such as a mechanism, is refused before the first point."""
