@@ -37,7 +37,6 @@ from foldyn.report.sections import Section as PageSection
 from foldyn.report.sections import Text as PageText
 from foldyn.results.dataset import bands_dataset
 from foldyn.results.quantities import BANDS, GAPS
-from foldyn.tables import Section
 
 AROUND = {1: "G-X", 2: "G-X-M-Y-G", 3: "G-X-M-Y-G-Z-U-R-T-Z"}
 """Default paths around the zone, by its number of dimensions."""
@@ -74,15 +73,10 @@ class BandsSection(CellSection):
     check_model: bool = True
 
 
-class BandsOutput(Section):
-    """[output] of kind "bands"; it has no keys."""
-
-
 class BandsSchema(CellSchema):
     """A case file of kind "bands"."""
 
     analysis: BandsSection
-    output: BandsOutput = BandsOutput()
 
     @property
     def solutions(self) -> tuple[float, str]:

@@ -105,8 +105,7 @@ class BucklingAnalysis(Analysis):
     def sections(case_file: CaseFile, results: ByRule, album: Album) -> Iterator[PageSection]:
         """See `Analysis`."""
         (first, result), *_ = results.items()
-        case = case_file.case(first)
-        yield from album.structure(case)
+        yield from album.structure(case_file.case(first))
         if result.sizes["mode"]:
             yield Heading("The shapes")
             yield from album.figure(

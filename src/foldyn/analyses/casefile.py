@@ -161,8 +161,7 @@ class Analysis(ABC):
 
 def movable(case: Case) -> NDArray[np.int64]:
     """Vertices that supports do not hold along all axes."""
-    vertices = len(case.structure.pattern.vertices)
-    return np.flatnonzero(~case.fixed[:vertices].all(axis=1))
+    return np.flatnonzero(~case.fixed[: len(case.structure.pattern.vertices)].all(axis=1))
 
 
 def arguments_of(function: Callable[..., Any]) -> tuple[str, ...]:
@@ -334,8 +333,7 @@ class CaseFile:
         except InputError as error:
             if error.file is not None:
                 raise
-            place = self.named(mass) + self._section(error.key)
-            raise error.within(place, self.path) from None
+            raise error.within(self.named(mass) + self._section(error.key), self.path) from None
 
     def named(self, mass: str | None) -> str:
         """Prefix of messages that names the mass rule; "" if the file has only one."""
@@ -349,9 +347,7 @@ class CaseFile:
         return ""
 
     def _rule(self, mass: str | None) -> str:
-        if mass is None:
-            return self.masses[0]
-        return choice("mass", mass, MODELS[self.model].masses)
+        return self.masses[0] if mass is None else choice("mass", mass, MODELS[self.model].masses)
 
 
 class Computation:

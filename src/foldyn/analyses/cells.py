@@ -187,8 +187,7 @@ def _placed(vary: Varied | None, value: Any) -> Iterator[None]:
 def coordinate(vary: Varied) -> tuple[str, NDArray, dict[str, str]]:
     """Coordinate of the states."""
     word = vary.key.rpartition(".")[2]
-    bare = word.partition("[")[0]
-    unit = unit_of(bare, vary.values[0])
+    unit = unit_of(word.partition("[")[0], vary.values[0])
     text = {"key": vary.key, "long_name": word.replace("_", " ")}
     return "state", np.array(vary.values), text | ({"units": unit} if unit else {})
 

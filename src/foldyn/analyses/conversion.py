@@ -42,8 +42,7 @@ STARTLESS: Mapping[str, str] = {
 def startless(path: Path, document: Document, kind: str) -> Document:
     """The document as an analysis in `STARTLESS`; warns that its start and drive are left out."""
     _tell(path, kind, _tables(document, "initial", "drive"), STARTLESS[kind])
-    kept = _without(document, "initial", "drive", "output")
-    return {**kept, "analysis": {"kind": kind}}
+    return {**_without(document, "initial", "drive", "output"), "analysis": {"kind": kind}}
 
 
 def unbounded(path: Path, document: Document, kind: str, state: str) -> Document:

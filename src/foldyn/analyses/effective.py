@@ -18,7 +18,6 @@ from foldyn.linear.cell_equilibrium import BY_STATE
 from foldyn.report.album import Album, ByRule
 from foldyn.report.sections import Heading, Section, Table, Text, cell
 from foldyn.results.dataset import result_dataset
-from foldyn.tables import Section as FileSection
 
 MATRICES = {
     "membrane": ("membrane", "membrane"), "coupling": ("membrane", "bending"),
@@ -36,10 +35,6 @@ MEANING = (
 )
 
 
-class EffectiveOutput(FileSection):
-    """[output] of kind "effective"; it has no keys."""
-
-
 class EffectiveSection(CellSection):
     """[analysis] of kind "effective"."""
 
@@ -48,7 +43,6 @@ class EffectiveSchema(CellSchema):
     """A case file of kind "effective"."""
 
     analysis: EffectiveSection
-    output: EffectiveOutput = EffectiveOutput()
 
 
 class EffectiveAnalysis(Analysis):

@@ -24,7 +24,7 @@ from foldyn.linear.shell_of import checked_divisions
 from foldyn.report.album import Album, ByRule
 from foldyn.report.sections import Heading, Table, Text
 from foldyn.report.sections import Section as PageSection
-from foldyn.tables import ListOf, Section
+from foldyn.tables import ListOf
 from foldyn.values import show
 
 
@@ -42,15 +42,10 @@ class FidelitySection(AnalysisSection):
     vertex_radius: Positive | None = None
 
 
-class FidelityOutput(Section):
-    """[output] of kind "fidelity"; it has no keys."""
-
-
 class FidelitySchema(CaseSchema):
     """A case file of kind "fidelity"."""
 
     analysis: FidelitySection
-    output: FidelityOutput = FidelityOutput()
 
     def agree(self) -> None:
         """Refuse other models than bars and hinges."""

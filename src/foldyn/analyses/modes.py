@@ -103,7 +103,9 @@ class ModesAnalysis(Vibration):
         (first, modes), *others = results.items()
         case = case_file.case(first)
         shown = chosen_modes(modes, case_file.output.shapes)
-        names = _character(case_file, modes, case)
+        output = case_file.output
+        nodes = output.nodes if output.named else None
+        names = character(modes, output.axis, nodes=nodes, case=case)
         rule = f", mass rule {first}" if others else ""
         yield from album.structure(case)
         yield Heading("The modes")
@@ -149,16 +151,9 @@ def _about(modes: xarray.Dataset) -> str:
     return states.get(str(modes.attrs["state"]), "the stored state")
 
 
-def _character(case_file: CaseFile, modes: xarray.Dataset, case: Case) -> xarray.Dataset:
-    """Characters of the modes along the axis given in the file, or along the main axis."""
-    chosen = case_file.output
-    return character(modes, chosen.axis, nodes=chosen.nodes if chosen.named else None, case=case)
-
-
 def _judged(case_file: CaseFile, names: xarray.Dataset) -> str:
     """Text for a caption on how modes were named."""
-    nodes = case_file.output.nodes.tolist()
-    of = f" of {listed('node', nodes)}" if case_file.output.named else ""
+    of = f" of {listed('node', case_file.output.nodes.tolist())}" if case_file.output.named else ""
     return f"named by the largest share of their motion{of}, seen along {names.attrs['axis']}"
 
 

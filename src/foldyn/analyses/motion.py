@@ -119,8 +119,7 @@ class MotionAnalysis(Analysis):
             check_stresses(case, "output.stresses")
         own = {name: getattr(output, name) for name in SAMPLING}
         given = {name: value for name, value in own.items() if value is not None}
-        default = {"interval": schema.analysis.duration / SAMPLES}
-        analysis.arguments.update(given or default)
+        analysis.arguments.update(given or {"interval": schema.analysis.duration / SAMPLES})
         return analysis
 
     def prepare(self, case_file: CaseFile, mass: str, changes: Mapping[str, Any]) -> Compute:
@@ -253,8 +252,7 @@ class MotionComputation:
 
 def _table(case_file: CaseFile, results: ByRule, nodes: list[int]) -> Table:
     def largest(result: xarray.Dataset) -> float:
-        moved = result["displacement"].to_numpy()[:, nodes]
-        return float(np.linalg.norm(moved, axis=-1).max())
+        return float(np.linalg.norm(result["displacement"].to_numpy()[:, nodes], axis=-1).max())
 
     columns = {
         "steps": "steps",

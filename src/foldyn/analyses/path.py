@@ -150,9 +150,7 @@ class PathAnalysis(Analysis):
     kind = "statics"
     moving = True
     schema = PathSchema
-    files = (
-        "reaction", "curve", "energies", "landscape", "shapes", "path.gif", "path.mp4", *FILES,
-    )  # fmt: skip
+    files = ("reaction", "curve", "energies", "landscape", "shapes", "path.gif", "path.mp4", *FILES)
     needs_density = ""
     takes = (*arguments_of(trace), *SETTINGS)
 
@@ -404,5 +402,4 @@ def _run(case_file: CaseFile, path: xarray.Dataset) -> Table:
         "tolerance": path.attrs["tolerance"],
         "time (s)": path.attrs["wall_seconds"],
     }
-    caption = f"{case_file.path.name}: the run"
-    return Table(list(cells), [list(cells.values())], caption, digits=3)
+    return Table(list(cells), [list(cells.values())], f"{case_file.path.name}: the run", digits=3)

@@ -54,8 +54,7 @@ class Call:
 
 def provenance(case_file: Any, results: ByRule, call: Call | None = None) -> list[Section]:
     """Table of all inputs that led to results of a `CaseFile`, and the text of the file."""
-    first = next(iter(results))
-    rows = inputs(case_file, case_file.case(first), results)
+    rows = inputs(case_file, case_file.case(next(iter(results))), results)
     rows += computed(results, call or Call())
     sections: list[Section] = [Heading("How it was computed"), inputs_table(rows)]
     if case_file.text:

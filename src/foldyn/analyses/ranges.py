@@ -111,8 +111,7 @@ def _range(key: str, text: str, sampled: bool) -> Varied:
     """A range A:B:N or A:B, with or without :log."""
     words = [word.strip() for word in text.split(":")]
     log = words[-1] == LOG
-    count = len(words) - log
-    if count != (2 if sampled else 3):
+    if len(words) - log != (2 if sampled else 3):
         raise InputError(f" = {show(text)}: {_SAMPLED if sampled else _REMEDY}")
     ends = [_word(word) for word in words[:2]]
     with within(f" = {show(text)}: "):

@@ -62,9 +62,7 @@ def schema_of(document: Mapping[str, Any]) -> type[CaseSchema]:
     """Schema of a case file, by its kind."""
     analysis = document.get("analysis")
     kind = analysis.get("kind") if isinstance(analysis, Mapping) else None
-    if isinstance(kind, str) and kind in ANALYSES:
-        return ANALYSES[kind].schema
-    return UnknownSchema
+    return ANALYSES[kind].schema if isinstance(kind, str) and kind in ANALYSES else UnknownSchema
 
 
 def case_schema() -> Schema:

@@ -20,7 +20,7 @@ from foldyn.periodic.response import checked_range
 from foldyn.report.album import Album, ByRule, computation
 from foldyn.report.sections import Heading, Table
 from foldyn.report.sections import Section as PageSection
-from foldyn.tables import ListOf, Section
+from foldyn.tables import ListOf
 from foldyn.values import number
 
 ENDS = ListOf(Check(number, above=0.0), "two numbers, as in [2.0, 5.0]", least=2, most=2)
@@ -44,15 +44,10 @@ class ResponseSection(AnalysisSection):
         checked_range(self.frequencies, self.amplitudes)
 
 
-class ResponseOutput(Section):
-    """[output] of kind "response"; it has no keys."""
-
-
 class ResponseSchema(CaseSchema):
     """A case file of kind "response"."""
 
     analysis: ResponseSection
-    output: ResponseOutput = ResponseOutput()
 
 
 class ResponseAnalysis(Analysis):

@@ -397,6 +397,10 @@ class ImperfectionSection(Section):
             raise InputError(f": is not for {why}; leave it out", other)
 
 
+class NoOutput(Section):
+    """[output] of a kind of analysis without such keys."""
+
+
 class CaseSchema(Section):
     """The tables that every case file may have.
 
@@ -419,3 +423,4 @@ class CaseSchema(Section):
     air: Annotated[Air | None, TableOf(Air)] = None
     sweep: SweepSection | None = None
     design: DesignSection | None = None
+    output: NoOutput = NoOutput()

@@ -229,8 +229,7 @@ class Case(Loaded, Damped):
     @cached_property
     def remembering(self) -> tuple[Remembering, ...]:
         """Hinges with memory, by kind; `body` holds only the elastic parts of their laws."""
-        own = remembering(self.structure, self.body, self.crease_damping)
-        return (*own, *self.latches)
+        return (*remembering(self.structure, self.body, self.crease_damping), *self.latches)
 
     @cached_property
     def latches(self) -> tuple[Remembering, ...]:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, wraps
 from typing import Any
 
 import numpy as np
@@ -27,6 +27,11 @@ from foldyn.structures.swelling import Swelling
 
 Terms = tuple[tuple[NDArray[np.float64], History], ...]
 Summands = Iterable[tuple[NDArray[np.float64], Any]]
+
+
+def summed(parts: Callable[[Any], Summands]) -> cached_property[Terms]:
+    """Property: the vectors that a method yields, added up by their histories."""
+    return cached_property(wraps(parts)(lambda self: _sum_by_history(parts(self))))
 
 
 class Supported:
@@ -126,12 +131,9 @@ class Supported:
         """Numbers 3 * node + axis that are held, increasing."""
         return np.flatnonzero(self.fixed.ravel()).astype(np.int64)
 
-    @cached_property
-    def imposed_terms(self) -> Terms:
+    @summed
+    def imposed_terms(self) -> Summands:
         """Displacements (m) of imposed dofs at factor 1, shape (n, 3), each with its history."""
-        return _sum_by_history(self._imposed())
-
-    def _imposed(self) -> Summands:
         for place, support in self._supports(Impose):
             nodes, value = supported_points(self.structure, support, place)
             vector, along = np.zeros((len(self.structure.nodes), 3)), {place: value}
@@ -164,12 +166,9 @@ class Supported:
             shape[inner] = np.where(self._straight[inner], between, stated[inner])
         return ties.moved(shape, values_of(ties.owners, values), place) if ties else shape
 
-    @cached_property
-    def base_terms(self) -> Terms:
+    @summed
+    def base_terms(self) -> Summands:
         """Displacements (m) of the base at factor 1, shape (n, 3), each with its history."""
-        return _sum_by_history(self._base_motions())
-
-    def _base_motions(self) -> Summands:
         base = self.fixed & ~self.imposed
         for place, support in self._supports(BaseMotion):
             axis = AXES.index(support.axis)
@@ -210,17 +209,9 @@ class Loaded:
     point_masses: Any
     held_edges: Any
 
-    @cached_property
-    def actuation_terms(self) -> Terms:
-        """Changes (rad) of the folds' rest angles at factor 1, shape (nf,), with their history."""
-        return _sum_by_history(self._actuations())
-
-    @cached_property
-    def rest_terms(self) -> Terms:
+    @summed
+    def rest_terms(self) -> Summands:
         """Changes (rad) of all rest angles at factor 1, shape (nr,), with their history."""
-        return _sum_by_history(self._rest_changes())
-
-    def _rest_changes(self) -> Summands:
         found = list(self.actuation_terms)
         for place, load in self._loads():
             turns = load.turns(self.structure, place)
@@ -230,7 +221,9 @@ class Loaded:
             count = len(self.structure.body.sheet.rest_angles)
             yield np.pad(change, (0, count - len(change))), history
 
-    def _actuations(self) -> Summands:
+    @summed
+    def actuation_terms(self) -> Summands:
+        """Changes (rad) of the folds' rest angles at factor 1, shape (nf,), with their history."""
         first: dict[int, str] = {}  # the load that actuates a crease
         for place, load in self._loads():
             actuated = load.rest_changes(self.structure, place)
@@ -248,15 +241,15 @@ class Loaded:
             vector[creases] = change
             yield vector, load.history
 
-    @cached_property
-    def load_terms(self) -> Terms:
+    @summed
+    def load_terms(self) -> Summands:
         """Forces (N) on all nodes, shape (n, 3), each with its history."""
-        return _sum_by_history(self._forces(self._loads()))
+        return self._forces(self._loads())
 
-    @cached_property
-    def force_terms(self) -> Terms:
+    @summed
+    def force_terms(self) -> Summands:
         """The terms of `load_terms` without gravity."""
-        return _sum_by_history(self._forces(pair for pair in self._loads() if pair[1].arrows))
+        return self._forces(pair for pair in self._loads() if pair[1].arrows)
 
     def _forces(self, loads: Iterable[tuple[str, Load]]) -> Summands:
         for place, load in loads:
@@ -293,15 +286,13 @@ class Loaded:
         for place, load in self._loads():
             own = load.swelling(self.structure, place)
             if own is not None:
-                forces = self._following(load, place)
-                found.append((own._replace(forces=forces), load.history))
+                found.append((own._replace(forces=self._following(load, place)), load.history))
         return tuple(found)
 
-    @cached_property
-    def gravity_terms(self) -> Terms:
+    @summed
+    def gravity_terms(self) -> Summands:
         """Accelerations of gravity (m/s2), shape (3,), each with its history."""
-        gravity = (load for _, load in self.loads_of(Gravity))
-        return _sum_by_history((np.array(load.acceleration), load.history) for load in gravity)
+        return ((np.array(load.acceleration), load.history) for _, load in self.loads_of(Gravity))
 
     @cached_property
     def loaded_nodes(self) -> NDArray[np.int64]:

@@ -103,8 +103,7 @@ def held_edges(
     for support in supports:
         if not getattr(support, "along", False):
             continue
-        units = _axes(support) or [support.direction]
-        held = np.array([unit_vector(unit) for unit in units])
+        held = np.array([unit_vector(unit) for unit in _axes(support) or [support.direction]])
         for edge in edges_between(structure, resolve_nodes(structure, support.nodes, "nodes")):
             found.setdefault(number[edge_of(int(edge[0]), int(edge[-1]))], []).append(held)
     for low, high in structure.options.clamped:

@@ -212,14 +212,8 @@ class Constraints:
     @cached_property
     def supported(self) -> NDArray[np.int64]:
         """Dofs (s,), increasing, on which supports exert forces, along axes or directions."""
-        return np.union1d(np.flatnonzero(self.held), self._along).astype(np.int64)
-
-    @cached_property
-    def _along(self) -> NDArray[np.int64]:
-        """Dofs on which supports act along a direction."""
-        return np.unique(
-            [dof for one in self.equations if _is_direction(one) for dof in one.dofs]
-        ).astype(np.int64)
+        along = [dof for one in self.equations if _is_direction(one) for dof in one.dofs]
+        return np.union1d(np.flatnonzero(self.held), along).astype(np.int64)
 
     @cached_property
     def reactions(self) -> sparse.csr_array:
@@ -230,9 +224,8 @@ class Constraints:
             return sparse.csr_array(sparse.csr_array(own)[self.supported])
         kept = [self.equations[k] for k in self._solved.kept]
         straight = np.array([float(_is_direction(one)) for one in kept])
-        put = sparse.csr_array(
-            (straight, (np.arange(len(kept)), self.slaves)), (len(kept), size)
-        )  # the multipliers of directions
+        # the multipliers of directions
+        put = sparse.csr_array((straight, (np.arange(len(kept)), self.slaves)), (len(kept), size))
         exerted = own + self.rows[self._solved.kept].T @ put
         return sparse.csr_array((sparse.csr_array(exerted) @ self.basis.T)[self.supported])
 

@@ -177,5 +177,4 @@ def _followers(case: Case, decided: NDArray) -> tuple[NDArray, sparse.csr_array]
     centers = np.asarray(getattr(structure, "centers", ()), np.int64)
     centers = centers[centers >= 0]  # other panels have no center
     centers = centers[~decided[centers] & (beside[centers] @ ~decided == 0)]
-    mean = sparse.csr_array(beside[centers] / beside[centers].sum(axis=1)[:, None])
-    return centers, mean
+    return centers, sparse.csr_array(beside[centers] / beside[centers].sum(axis=1)[:, None])

@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Annotated, Any, ClassVar
 
 from foldyn.arguments import Check, Checked, Placed, Read, arguments
-from foldyn.cases.histories import HISTORIES, History, Table
-from foldyn.cases.history import as_history
+from foldyn.cases.histories import HISTORIES, Table
+from foldyn.cases.history import History, as_history
 from foldyn.errors import Faults, InputError, within
 from foldyn.json_schema import Schema, any_of, of_call
 from foldyn.mechanics.term import Term

@@ -22,8 +22,8 @@ from foldyn.cases.case import Case
 from foldyn.cases.contact import Contact
 from foldyn.cases.damping import DampingSection, damping_table
 from foldyn.cases.decode import law_from
-from foldyn.cases.histories import HISTORIES, History, Table
-from foldyn.cases.history import STEADY, as_history
+from foldyn.cases.histories import HISTORIES, Table
+from foldyn.cases.history import STEADY, History, as_history
 from foldyn.cases.loads import LOAD, Load
 from foldyn.cases.masses import MASS
 from foldyn.cases.models import BARS_AND_HINGES, MODELS, SHELL
@@ -375,9 +375,7 @@ def _resolve(value: Any, arrays: Mapping[str, NDArray]) -> Any:
                 raise InputError(f"the stored case lacks its array {value['array']}")
             return arrays[value["array"]]
         return {key: _resolve(item, arrays) for key, item in value.items()}
-    if isinstance(value, list):
-        return [_resolve(item, arrays) for item in value]
-    return value
+    return [_resolve(item, arrays) for item in value] if isinstance(value, list) else value
 
 
 def _material(given: Mapping[str, Any]) -> dict[str, Any]:

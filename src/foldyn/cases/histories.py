@@ -17,15 +17,10 @@ from numpy.typing import NDArray
 
 from foldyn.arguments import Check, Flag
 from foldyn.cases.csv_table import read_columns
-from foldyn.cases.history import Constant, Formula, History, Waveform
+from foldyn.cases.history import Constant, Formula, Waveform
 from foldyn.errors import InputError
 from foldyn.jit.compiled import inner_scalar
 from foldyn.values import SMALLEST, number, numbers, show
-
-__all__ = [
-    "HISTORIES", "Chirp", "Constant", "HalfSine", "Harmonic", "History", "Pulse", "Ramp", "Step",
-    "Table",
-]  # fmt: skip
 
 TABLE = 8  # code of tables
 SHARP = 0.01  # deviation from a straight line at a sharp corner, relative to the table's range

@@ -26,19 +26,6 @@ from foldyn.errors import InputError, within
 from foldyn.structures.discretized import Discretized, Distributed
 from foldyn.values import doubt_degrees, number, number_or_list, one_or_each, parsed, show, vector
 
-__all__ = [
-    "LOADS",
-    "Actuate",
-    "CreaseMoment",
-    "Force",
-    "Gravity",
-    "LineLoad",
-    "Load",
-    "Pressure",
-    "Temperature",
-    "TotalForce",
-]
-
 FOLDED = ("angle", "fold_angle", "fraction")  # `Actuate` takes exactly one of these arguments
 STANDARD = 9.80665  # m/s2, standard gravity (3rd CGPM, 1901)
 

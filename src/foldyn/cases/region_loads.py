@@ -256,8 +256,7 @@ class Pressure(Load):
 
     def check(self, structure: Discretized, fixed: NDArray[np.bool_], place: str) -> None:
         """Refuse a pressure on panels whose nodes are all held."""
-        nodes = np.unique(self.following(structure, place).triangles)
-        if fixed[nodes].all():
+        if fixed[np.unique(self.following(structure, place).triangles)].all():
             raise InputError(
                 f".panels = {show(self.panels)}: supports hold all nodes of these panels along "
                 "all axes; load other panels, or free these",

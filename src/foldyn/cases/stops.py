@@ -318,8 +318,7 @@ def on_hinges(part: Any, structure: Discretized, place: str) -> OnHinges:
     folds = structure.body.sheet.fold_hinges()
     creases = resolve_creases(structure, part.creases, f"{place}.creases")
     angles, rest = np.zeros((2, len(structure.folds)))
-    given = one_or_each(f"{place}.angle", part.angle, len(creases), "creases")
-    angles[creases] = np.radians(given)
+    angles[creases] = np.radians(one_or_each(f"{place}.angle", part.angle, len(creases), "creases"))
     rest[creases] = structure.pattern.dihedrals[creases]
     side = np.sign((angles - rest).round(DIGITS))
     stated = getattr(part, "side", None)
@@ -406,8 +405,7 @@ def stop_dampers(
         part.damping * length[one.row] * one.share**2
         for one, (_, part) in zip(on, damped, strict=True)
     ]
-    packed = _packed(on, np.concatenate(own), structure)
-    return StopDampersTerm(packed, structure.body.sheet.rows)
+    return StopDampersTerm(_packed(on, np.concatenate(own), structure), structure.body.sheet.rows)
 
 
 def _packed(on: Sequence[OnHinges], strength: NDArray, structure: Discretized) -> Stops:

@@ -87,8 +87,7 @@ class Unknowns(NamedTuple):
         edge, panel = np.arange(self.edges), np.arange(self.panels)
         vertices = np.arange(3 * self.vertices)
         bows = other.bow(edge[:, None, None], np.arange(self.functions)[:, None]) + np.arange(3)
-        number = np.arange(self.level.turns)
-        turned = other.turn(np.arange(len(self.sides.edge))[:, None], number)
+        turned = other.turn(np.arange(len(self.sides.edge))[:, None], np.arange(self.level.turns))
         inner = other.inner(panel[:, None], np.arange(self.level.inner))
         return np.concatenate([vertices, bows.ravel(), turned.ravel(), inner.ravel()])
 
@@ -156,8 +155,7 @@ class Whole:
             elif what == BOW:
                 e, axis = divmod(where, 3)
                 degree = (ALONG if axis == 0 else ACROSS)[shape][1]
-                function = FUNCTION[shape] if axis == 0 else shape
-                first = own.bow(edge[:, e], function)
+                first = own.bow(edge[:, e], FUNCTION[shape] if axis == 0 else shape)
                 sign = np.where(backwards[:, e], (-1.0) ** degree, 1.0)
                 vector = sign[:, None] * frames[:, e, axis]
             elif what == TURN:
@@ -255,8 +253,7 @@ class Whole:
     def on_edges(self, places: NDArray) -> sparse.csr_array:
         """Displacements (3 e p, m) of points at places (e, p), from 0 to 1, of all edges."""
         own, (edges, count) = self.unknowns, places.shape
-        length = np.linalg.norm(self._along, axis=1)
-        cut_off = np.repeat(self._graded.radius / length, count)
+        cut_off = np.repeat(self._graded.radius / np.linalg.norm(self._along, axis=1), count)
         share = bows(places.ravel(), cut_off, 1)[:, : own.functions]
         weight = np.column_stack([1.0 - places.ravel(), places.ravel(), share])
         bow = own.bow(np.arange(edges)[:, None], np.arange(own.functions)) // 3
@@ -303,8 +300,7 @@ class Whole:
                 out[first : first + 3 * own.functions] += np.outer(mean, force[edge]).ravel()
         if load.strain is not None and load.curvature is not None:
             for group, (kept, placed) in zip(self.groups, self.amplitudes, strict=True):
-                free = group.swollen(load.strain, load.curvature)
-                forces = free @ group.panel.thermal[kept].T
+                forces = group.swollen(load.strain, load.curvature) @ group.panel.thermal[kept].T
                 out += placed.T @ forces.ravel()
         return out if load.panels is None else out + self._on_panels(load.panels)
 
@@ -324,8 +320,7 @@ class Whole:
         what, _, axis = group.panel.kind[kept].T
         moved = (what == VERTEX)[:, None] & (axis[:, None] == np.arange(3))
         inertia = group.panel.mass[np.ix_(kept, kept)] @ moved
-        area = self.pattern.face_areas[group.number[0]]
-        return inertia * area / (moved[:, 0] @ inertia[:, 0])
+        return inertia * self.pattern.face_areas[group.number[0]] / (moved[:, 0] @ inertia[:, 0])
 
     def held(self, strain: NDArray, curvature: NDArray) -> NDArray[np.float64]:
         """Free strains and curvatures of panels with held edges, and their forces (2, np, 4)."""

@@ -193,8 +193,7 @@ def groups(
 def different(pattern: Pattern, sheet: Sheet) -> int:
     """How many panels have to be condensed."""
     kinds, kind = sheet.kinds(len(pattern.faces))
-    fibers = material_axes(pattern, sheet)
-    return len(_congruent(pattern, [kinds[k] for k in kind], fibers))
+    return len(_congruent(pattern, [kinds[k] for k in kind], material_axes(pattern, sheet)))
 
 
 def _congruent(

@@ -83,5 +83,4 @@ def bows(
 
 def turns(place: NDArray, count: int) -> NDArray[np.float64]:
     """Shapes (p, count) of the turn of the sheet at places (p,) of an edge."""
-    places = 2.0 * place - 1.0
-    return np.array(legendre.legvander(places, count - 1), float)
+    return np.array(legendre.legvander(2.0 * place - 1.0, count - 1), float)

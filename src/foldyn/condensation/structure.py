@@ -408,12 +408,11 @@ def superelements(
     pieces = EXTRAPOLATED if divisions is None else (divisions,)
     fans = [(face[0], *face[k : k + 2]) for face in pattern.faces for k in range(1, len(face) - 1)]
     panel = [number for number, face in enumerate(pattern.faces) for _ in face[2:]]
-    folds = _folds(pattern)
     made = Superelements(
         nodes=pattern.vertices,
         triangles=np.array(fans, np.int64),
         triangle_panel=np.array(panel),
-        folds=folds,
+        folds=_folds(pattern),
         fold_stiffness=calibration.fold_stiffness(options.crease_stiffness, pattern, sheet),
         fold_rest=calibration.fold_rest(options.crease_rest, pattern.dihedrals, pattern),
         pattern=pattern,

@@ -165,8 +165,7 @@ class SuperelementsTerm(SheetTerm):
         self._parts_of = parts
         self.mass, self.crease_turns, self._fold_hinges, self._panels = mass, turns, folds, panels
         self.rotated, self._slope, self._changed = rotated, slope, np.zeros(len(slope))
-        resisted = turns.rows * slope[turns.fold][:, None]
-        self._folds = sparse.csr_array(turns.rows.T @ resisted)
+        self._folds = sparse.csr_array(turns.rows.T @ (turns.rows * slope[turns.fold][:, None]))
         self._stiffness = sparse.csr_array(panels + self._folds)
         self._nodes, self._extent = nodes, float(np.linalg.norm(np.ptp(nodes, axis=0)))
         self.model = None

@@ -177,10 +177,9 @@ def differenced(
         return Arrays({text: np.array([value]) for text, value in values(case).items()}, {})
 
     slopes = design.slopes(numbers, steps)
-    texts = next(iter(slopes.values())).by
     return {
         text: {name: slope.by[text].toarray()[0] for name, slope in slopes.items()}
-        for text in texts
+        for text in next(iter(slopes.values())).by
     }
 
 

@@ -286,8 +286,7 @@ class Constraint:
         (left, slopes), (right, others) = (
             side.value_and_slopes(values) for side in (self.left, self.right)
         )
-        every = self.measures
-        return left - right, {n: slopes.get(n, 0.0) - others.get(n, 0.0) for n in every}
+        return left - right, {n: slopes.get(n, 0.0) - others.get(n, 0.0) for n in self.measures}
 
     def size(self, values: Mapping[str, float]) -> float:
         """Scale of a violation: the side that is a plain number, else the larger side."""

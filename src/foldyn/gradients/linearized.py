@@ -124,8 +124,7 @@ class Products:
                 for each in (z, x)
             )  # fmt: skip
             add_mass_products(sheet.parts, one, other, by, total["0.mass"])
-            nodes = self._case.structure.nodes.size
-            product = (one * other)[:nodes].reshape(-1, 3).sum(axis=1)
+            product = (one * other)[: self._case.structure.nodes.size].reshape(-1, 3).sum(axis=1)
             total["point_masses"] += by * product
             return
         one, other = (

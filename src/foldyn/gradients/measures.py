@@ -112,8 +112,7 @@ def _extreme(sign: float) -> Derivative:
     def places(result: xr.Dataset, case: Case, node: int, axis: str) -> list[tuple[int, ...]]:
         return _largest(sign * result["displacement"].sel(node=node, axis=axis).values)
 
-    own = _of_samples(lambda result, motion, at: _one(len(motion), *at))
-    return own._replace(places=places)
+    return _of_samples(lambda result, motion, at: _one(len(motion), *at))._replace(places=places)
 
 
 def _trapezoid(result: xr.Dataset) -> NDArray:

@@ -128,9 +128,7 @@ def equilibria(one: Asked, result: xarray.Dataset, others: Sequence[Asked]) -> l
 def _problem(one: Asked) -> OrigamiProblem:
     """Equilibrium problem of a case; refuses contact, memory and constant loads."""
     case, given = one.case, one.arguments
-    lacks = (
-        case.contact, case.remembering, given.get("inertia_relief"), given.get("duration"),
-    )  # fmt: skip
+    lacks = case.contact, case.remembering, given.get("inertia_relief"), given.get("duration")
     if any(lacks) or np.size(given.get("constant", ())):
         raise InputError(f"{NONE} a path with contact or memory")
     return OrigamiProblem(case)
@@ -173,8 +171,7 @@ def motions(
         packed = pack(other.case, motion.packed.system.waves.span, motion.origin)
         if not np.array_equal(packed.numbering.order, motion.packed.numbering.order):
             raise InputError(f"{NONE} a motion whose nodes are numbered otherwise")
-        begun = begin(other.case, *start, None, None, motion.plan, packed)
-        beside.append(Companion(packed, begun))
+        beside.append(Companion(packed, begin(other.case, *start, None, None, motion.plan, packed)))
     engines: list[Accompanied] = []
     scheme: Any = motion.method.scheme
     steps = motion.plan, jumps(case)
@@ -319,8 +316,7 @@ def _repeated(
 ) -> NDArray[np.complex128]:  # fmt: skip
     """Balanced responses (c, nf) of the neighbors, all begun from the first case's x (nf,)."""
     begin = np.repeat(x[:, None], count, axis=1)
-    size = float(np.linalg.norm(x))
-    return refined(begin, lambda each: -factors.solve(left(each)), size).T
+    return refined(begin, lambda each: -factors.solve(left(each)), float(np.linalg.norm(x))).T
 
 
 def _harmonic(

@@ -102,8 +102,7 @@ class Balance:
 
         by_state : derivatives (m,) of the quantity with respect to the dofs at fixed numbers.
         """
-        adjoint = self.under(by_state)
-        seen_through(self.case, self.q, by_state, adjoint, pullback, total, factor)
+        seen_through(self.case, self.q, by_state, self.under(by_state), pullback, total, factor)
 
 
 def seen_through(
@@ -228,8 +227,7 @@ class PathGradient(Differentiated):
         rate = case.body.tangent(q)[:, : motion.size] @ motion.ravel()
         rate[: growing.size] -= growing.ravel()
         along = float(weight @ rate)
-        size = float(np.abs(weight) @ np.abs(rate))
-        if abs(along) <= 1e-9 * size:
+        if abs(along) <= 1e-9 * float(np.abs(weight) @ np.abs(rate)):
             raise InputError(
                 "the load factor turns or branches there (a bifurcation): it has no derivative; "
                 "break the symmetry by a small load or a small change of the pattern"

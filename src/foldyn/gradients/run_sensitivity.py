@@ -313,8 +313,7 @@ OPEN = Choice(BARS_AND_HINGES, ANEW, open=True)
 def case_file_at(place: Path, document: dict[str, Any], values: Mapping[str, Any]) -> CaseFile:
     """A case file with other values for some keys, of a model that has gradients."""
     plain = {key: np.asarray(value).tolist() for key, value in values.items()}
-    changed = replaced(document, plain)
-    kept = {key: value for key, value in changed.items() if key not in ASIDE}
+    kept = {key: value for key, value in replaced(document, plain).items() if key not in ASIDE}
     return case_of_document(place, kept, choice=OPEN)
 
 

@@ -177,8 +177,7 @@ class ModesGradient(Differentiated):
         values = self._values
         near = np.abs(np.diff(values)) <= ALONE * np.abs(values[1:])
         ends = np.flatnonzero(~near) + 1
-        edges = [0, *ends.tolist(), len(values)]
-        return [(a, b) for a, b in pairwise(edges) if b - a > 1]
+        return [(a, b) for a, b in pairwise([0, *ends.tolist(), len(values)]) if b - a > 1]
 
     def _check_alone(self, by_value: NDArray, by_shape: NDArray) -> None:
         """Refuse derivatives of one of several modes with equal frequency."""

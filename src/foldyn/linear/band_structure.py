@@ -311,8 +311,7 @@ def damped_bands(
         "frequency": (("phase", "band"), np.abs(rates.imag) / TURN, {"units": "Hz"}),
         "damping_ratio": (("phase", "band"), ratio, {"units": "1"}),
     }
-    facts = {"count": count, "secant": secant}
-    return _dataset("damped_bands", linear, phases, given, data, facts)
+    return _dataset("damped_bands", linear, phases, given, data, {"count": count, "secant": secant})
 
 
 def damped_rates(bloch: Bloch, phase: NDArray, count: int) -> NDArray[np.complex128]:

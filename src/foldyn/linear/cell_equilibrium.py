@@ -103,8 +103,7 @@ def relaxed(
         factor = load_factor * (1.0 if state is not None else share)
         reach = CellReach(patch, then, folded_body(cell, patch, factor))
         first, now = _newton(reach, patch, then, first), then
-    moved = spread(end, first, patch.own_unit, patch.own_step) - rest
-    return State(displacement=moved)
+    return State(displacement=spread(end, first, patch.own_unit, patch.own_step) - rest)
 
 
 def _given(cell: UnitCell, motions: Any) -> tuple[Screw, ...]:

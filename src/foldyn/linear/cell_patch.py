@@ -256,8 +256,7 @@ def _per_crease(
             name,
         )
     values: dict[Any, Any] = {}
-    own = kinds_of(lattice.pattern.creases, lattice.vertices)
-    for kind, value in zip(own, given, strict=True):
+    for kind, value in zip(kinds_of(lattice.pattern.creases, lattice.vertices), given, strict=True):
         if values.setdefault(kind, value) != value:
             raise InputError(
                 ": has different values for the creases of one junction; give one value there", name

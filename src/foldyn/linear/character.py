@@ -78,8 +78,7 @@ def character(
         raise InputError(f"modes: is a {modes.attrs['foldyn_result']}; give modes")
     case = case_of(modes) if case is None else case
     structure, axis = case.structure, main_axis(case) if axis is None else check_axis("axis", axis)
-    every = np.arange(len(structure.nodes))
-    chosen = every if nodes is None else resolve_nodes(structure, nodes)
+    chosen = np.arange(len(structure.nodes)) if nodes is None else resolve_nodes(structure, nodes)
     if stations is None:
         count = max(2, min(MOST_STATIONS, len(chosen) // NODES_PER_STATION))
     else:

@@ -132,8 +132,7 @@ def effective(
         raise InputError(": has supports or clamped edges, and a free material has none", "cell")
     weighed = structure.sheet.density is not None
     if not weighed:
-        light = replace(structure, sheet=structure.sheet.weighed).marked()
-        case = replace(case, structure=light)
+        case = replace(case, structure=replace(structure, sheet=structure.sheet.weighed).marked())
     linear = linearize_cell(cell.with_case(case), state, secant, load_factor)
     if not linear.bloch.ties.empty:
         raise InputError(
@@ -182,8 +181,7 @@ def _beam_frame(linear: LinearizedCell) -> tuple[NDArray, float]:
     if length == 0.0:
         raise InputError(": repeats about an axis without a shift; a ring is no beam", "cell")
     axis = shift / length
-    first = np.eye(3)[np.abs(axis).argmin()]
-    one = np.cross(axis, first)
+    one = np.cross(axis, np.eye(3)[np.abs(axis).argmin()])
     one /= np.linalg.norm(one)
     return np.array([axis, one, np.cross(axis, one)]), length
 
@@ -213,8 +211,7 @@ def _beam(linear: LinearizedCell, energy: CellEnergy, frame: NDArray) -> tuple[N
     center = np.array(motion.point) if motion.turns else energy.center
     length, none, each = float(shift @ axis), np.zeros(3), np.eye(4)
     turn = length * np.array([[none, *frame]])
-    move = length * np.array([[axis, none, none, none]])
-    strains = _strains(linear, turn, move, center)
+    strains = _strains(linear, turn, length * np.array([[axis, none, none, none]]), center)
     angle = np.radians(motion.angle) * (motion.unit @ axis)
     still = energy.rigid(np.array([none, axis]), np.array([axis, np.cross(center, axis)]))
     sideways = energy.rigid(np.zeros((2, 3)), frame[1:])
@@ -259,8 +256,7 @@ def _warn_of(linear: LinearizedCell, kind: Equivalent, matrix: NDArray, loads: N
     names, straight, size = kind.names, kind.straight, linear.cell.case.structure.pattern.size
     unit = np.where(np.arange(len(names)) < straight, 1.0, size)  # of curvatures, and twists
     stiff = np.abs(np.diag(matrix)) / unit**2
-    plate = kind.straight == 3
-    stiffest = stiff.reshape(2, 3).max(axis=1).repeat(3) if plate else stiff.max()
+    stiffest = stiff.reshape(2, 3).max(axis=1).repeat(3) if kind.straight == 3 else stiff.max()
     scale = unit * np.sqrt(stiffest)
     values, ways = np.linalg.eigh(matrix / np.outer(scale, scale))
     lowest = WaveSolver(linear.bloch, 1).waves(np.zeros(len(linear.motions))).values[0]
@@ -495,8 +491,7 @@ class CellEnergy:
         """Motions (m, r) of cell 0 with rotations (r, 3), rad, and displacements at the origin."""
         cells = len(self._reach.steps)
         turn, move = (np.broadcast_to(each, (cells, *each.shape)) for each in (turn, move))
-        whole = self.displacements(MeanStrains(turn, move, np.zeros((cells, 3))))
-        return whole[self._reach.rows]
+        return self.displacements(MeanStrains(turn, move, np.zeros((cells, 3))))[self._reach.rows]
 
     def loads(self, strains: MeanStrains) -> NDArray[np.float64]:
         """Derivatives (p,) of the energy in the state, J, by mean strains."""

@@ -214,5 +214,4 @@ def warn_at(frequency: NDArray, text: str) -> None:
         return
     listed = ", ".join(f"{f:.6g}" for f in frequency[:NAMED])
     more = " and others" if frequency.size > NAMED else ""
-    message = f"frequencies: {text.format(f'{listed} Hz{more}')}"
-    warn(message, "frequency-response.md#methods")
+    warn(f"frequencies: {text.format(f'{listed} Hz{more}')}", "frequency-response.md#methods")

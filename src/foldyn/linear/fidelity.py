@@ -252,8 +252,7 @@ class Comparison:
             true, mesh_error = works.item(), lower / works.item() - 1.0
         else:
             divisions = [one.structure.options.divisions for one in self.references]
-            observed = is_graded(self.references[-1])
-            true = limits(works[:, None], divisions, observed=observed).item()
+            true = limits(works[:, None], divisions, observed=is_graded(self.references[-1])).item()
             mesh_error = works[2] / convergence(works[:, None], divisions).limit.item() - 1.0
         own = np.array([
             small_loads(case, self.secant).work if name in held else np.inf

@@ -291,8 +291,7 @@ def _uncoupled(basis: _Basis, damping: NDArray, omega: NDArray, load: NDArray) -
 
 def _resisting(system: Linearized, omega: float, x: NDArray) -> NDArray[np.complex128]:
     """Forces (nf,), N, that resist an oscillation x (nf,) at an angular frequency (rad/s)."""
-    elastic = system.stiffness @ x - omega**2 * (system.mass @ x)
-    return elastic + damped(system, omega, x)
+    return system.stiffness @ x - omega**2 * (system.mass @ x) + damped(system, omega, x)
 
 
 def damped(system: Linearized, omega: float, x: NDArray) -> NDArray:

@@ -143,8 +143,7 @@ class Hinges:
 
     def slope(self, motion: NDArray) -> NDArray:
         """Equivalent slopes / k (nh,) in a motion (nf,)."""
-        swing = np.maximum(np.abs(self.gradient @ motion), LEAST)
-        return equivalent_slope(self.offset, swing)
+        return equivalent_slope(self.offset, np.maximum(np.abs(self.gradient @ motion), LEAST))
 
     def change(self, slope: NDArray) -> sparse.csr_array:
         """Stiffness to add to the reference stiffness for the given slopes."""

@@ -108,8 +108,7 @@ class Lattice:
         found = {}
         for name, rows in own.families.items():
             rim = own.boundary[own.rim_families.get(name, np.zeros(0, np.int64))]
-            pairs = np.concatenate([own.creases[rows], rim])
-            found[name] = set(kinds_of(pairs, self.vertices))
+            found[name] = set(kinds_of(np.concatenate([own.creases[rows], rim]), self.vertices))
         return found
 
     def refuse_letters(self, words: Iterable[str], field: str) -> None:

@@ -293,12 +293,11 @@ def linearize_cell(
     damping = sparse.csr_array(
         damping_matrix(case, q, True) + case.rayleigh.matrix(mass, damped_tangent(case, tangent))
     )
-    matrices = {"stiffness": stiffness, "mass": mass, "damping": damping}
     bloch = Bloch(
         reach.steps,
         **{
             name: hermitian(reach.hops(own), reach.steps, name, patch.first)
-            for name, own in matrices.items()
+            for name, own in {"stiffness": stiffness, "mass": mass, "damping": damping}.items()
         },
         ties=reach.ties,
         hidden=reach.hidden,
@@ -379,8 +378,7 @@ def tiled(
     first = np.array(
         [images(motions, place[v], -patch.own_step[v]) for v in patch.first.tolist()]
     ).reshape(-1, 3)
-    copies = spread(motions, first, patch.own_unit, patch.own_step)
-    off = np.linalg.norm(copies - place, axis=1)
+    off = np.linalg.norm(spread(motions, first, patch.own_unit, patch.own_step) - place, axis=1)
     worst = int(off.argmax())
     if off[worst] > SLACK * cell.near:
         raise InputError(
@@ -425,6 +423,4 @@ def _residual(reach: CellReach, q: NDArray) -> float:
         float(np.abs(each).max(initial=0.0))
         for each in (force, reach.body.hinge_forces(q)[reach.rows])
     )
-    if left <= ROUNDING * float(reach.body.scale().max()):
-        return 0.0
-    return left / at_play
+    return 0.0 if left <= ROUNDING * float(reach.body.scale().max()) else left / at_play

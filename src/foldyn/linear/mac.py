@@ -178,8 +178,7 @@ def same_places(points: NDArray, nodes: NDArray, size: float) -> tuple[NDArray, 
 
 def clusters(frequency: NDArray) -> NDArray:
     """Number (k,) of the cluster to which each frequency (k,) belongs; frequencies increase."""
-    apart = np.diff(frequency) > NEAR * frequency[1:]
-    return np.concatenate([[0], np.cumsum(apart)])
+    return np.concatenate([[0], np.cumsum(np.diff(frequency) > NEAR * frequency[1:])])
 
 
 def likeness(fa: NDArray, a: NDArray, fb: NDArray, b: NDArray, mass: NDArray) -> NDArray:

@@ -100,8 +100,7 @@ def margins(
     if not np.isnan(factor).all():
         values |= _panels(found, factor / safety - 1.0, when)
         p = int(np.nan_to_num(values["panel_margin"], nan=np.inf).argmin())
-        point = values["panel_point"][p]
-        where = place_in(found, point) + moment(float(values["panel_state"][p]))
+        where = place_in(found, values["panel_point"][p]) + moment(float(values["panel_state"][p]))
         words.append((values["panel_margin"][p], where))
     creases = _crease_strengths(crease_strength, pattern)
     if creases is not None and len(creases):

@@ -143,8 +143,7 @@ def errors_of_bands(own: NDArray, true: NDArray) -> NDArray[np.float64]:
 def warn_of_bands(errors: NDArray) -> None:
     """Warn about bands whose frequencies, with errors (n, k) at n phases, are far off."""
     worst = np.abs(np.nan_to_num(errors)).argmax(axis=0)
-    largest = np.nan_to_num(errors[worst, np.arange(len(worst))])
-    told = _far_off("band", largest)
+    told = _far_off("band", np.nan_to_num(errors[worst, np.arange(len(worst))]))
     warn_of(told and f"{told} at some wave vectors")
 
 
@@ -195,8 +194,7 @@ def _far_off(name: str, errors: NDArray) -> str:
 
 def other_level(structure: Any) -> Superelements:
     """The structure with the level to compare with."""
-    highest = structure.options.level == len(LEVELS)
-    return structure.at_level(LOWER if highest else len(LEVELS))
+    return structure.at_level(LOWER if structure.options.level == len(LEVELS) else len(LEVELS))
 
 
 def frequency_errors(

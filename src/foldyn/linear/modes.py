@@ -193,12 +193,10 @@ def spectrum_of(
         other = np.full(len(spectrum.values), np.nan)  # a lower level may have fewer modes
         other[:most] = _lowest(leveled, most, solver, verify=False)[-1].values[: len(other)]
         motion = linear.whole(spectrum.shapes)
-        parts = case.structure.changes(case.held_edges)
-        changes = (motion.T @ (part @ motion) for part in parts)
+        changes = (motion.T @ (part @ motion) for part in case.structure.changes(case.held_edges))
         estimate = model_error.frequency_errors(case, spectrum.values, other, changes)
         variables["frequency_error"] = np.where(variables["rigid"], 0.0, estimate)
-    result = modes_dataset(case, variables, statistics)
-    return Found(linear, spectrum, result)
+    return Found(linear, spectrum, modes_dataset(case, variables, statistics))
 
 
 def _lowest(
@@ -246,8 +244,7 @@ def trusted(
 
 def most_modes(case: Case) -> int:
     """Largest number of modes of a case; in superelements edges and panels have mass as well."""
-    between = len(case.elastic_body.hidden) if case.structure.linear else 0
-    return len(case.free_dofs) + between
+    return len(case.free_dofs) + (len(case.elastic_body.hidden) if case.structure.linear else 0)
 
 
 def _variables(
@@ -265,13 +262,12 @@ def _variables(
         ratio = np.where(omega > 0.0, modal / (2.0 * omega) + remembered, np.nan)
     share = rigid_share(linear, space, shapes)
     factors = shapes.T @ (linear.mass @ along)
-    full = linear.expanded(shapes).T
     return {
         **(_air(linear, shapes) if linear.added is not None else {}),
         **_between(linear, shapes),
         "frequency": omega / (2.0 * np.pi),
         "eigenvalue": values,
-        "shape": full.reshape(-1, *linear.displacement.shape),
+        "shape": linear.expanded(shapes).T.reshape(-1, *linear.displacement.shape),
         "rigid": (values == 0.0) & (share > RIGID),
         "rigid_share": share,
         "damping_ratio": ratio,
@@ -342,9 +338,8 @@ def _between(linear: Linearized, shapes: NDArray) -> dict[str, Any]:
     if not isinstance(structure, Superelements):
         return {}
     points, motions = structure.between(linear.case.held_edges)
-    found = motions @ linear.whole(shapes)
     return {
-        "between_shape": found.T.reshape(shapes.shape[1], *points.shape),
+        "between_shape": (motions @ linear.whole(shapes)).T.reshape(shapes.shape[1], *points.shape),
         "between_position": points,
     }
 
@@ -444,8 +439,7 @@ def rigid_space(linear: Linearized) -> NDArray:
     chosen = np.linalg.lstsq(plain, allowed, rcond=None)[0]
     basis, _ = np.linalg.qr(chosen)
     motions = plain @ (basis @ basis.T)
-    whole = of_all_dofs(linear.case.elastic_body, x, motions)
-    return _orthonormal(linear, whole[linear.free])
+    return _orthonormal(linear, of_all_dofs(linear.case.elastic_body, x, motions)[linear.free])
 
 
 def _orthonormal(linear: Linearized, motions: NDArray) -> NDArray:
@@ -498,5 +492,4 @@ def _is_null(linear: Linearized, motions: NDArray) -> NDArray:
 def rigid_share(linear: Linearized, space: NDArray, shapes: NDArray) -> NDArray:
     """Share (k,) of shapes (nf, k) in the space (nf, r) of rigid motions, weighted by mass."""
     part = space.T @ (linear.mass @ shapes)
-    whole = np.einsum("ik,ik->k", shapes, linear.mass @ shapes)
-    return (part**2).sum(axis=0) / whole
+    return (part**2).sum(axis=0) / np.einsum("ik,ik->k", shapes, linear.mass @ shapes)

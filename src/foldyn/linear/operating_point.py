@@ -102,8 +102,7 @@ def _equilibrium(case: Case) -> tuple[NDArray, NDArray | None]:
     """
     factors = [0.0, 1.0] if drives(case, ()) else [0.0]
     nodes, body = case.structure.nodes, case.body
-    holds = body.holds(np.zeros(body.size))
-    free = free_rigid_motions(nodes, case.constraints, holds).shape[1] > 0
+    free = free_rigid_motions(nodes, case.constraints, body.holds(np.zeros(body.size))).shape[1] > 0
     with warnings.catch_warnings():  # the linearization itself gives these warnings
         for told in ("the path loses stability", NO_POTENTIAL[:20]):
             warnings.filterwarnings("ignore", told, FoldynWarning)

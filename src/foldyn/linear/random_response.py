@@ -260,8 +260,7 @@ def _sources(
     """Independent sources: each axis of the base, and the noises from which forces are mixed."""
     out = []
     for noise in block_diag(np.eye(len(driven) - len(together)), together).T:
-        acting = np.flatnonzero(noise).tolist()
-        each = [(driven[k], float(noise[k]), amounts[k]) for k in acting]
+        each = [(driven[k], float(noise[k]), amounts[k]) for k in np.flatnonzero(noise).tolist()]
         drives, factors, own = zip(*each, strict=True)
         out.append(Source(drives, factors, own))
     return out
@@ -297,8 +296,7 @@ class Driven(NamedTuple):
             base = -1.0 / omega**2
             own = own * base[:, None]
         root = np.sqrt(self.density.at(omega / TURN))
-        columns = root[:, None] * np.column_stack([own, base, unit])
-        return np.array(columns, np.complex128)
+        return np.array(root[:, None] * np.column_stack([own, base, unit]), np.complex128)
 
 
 class Source(NamedTuple):

@@ -166,8 +166,7 @@ def superelement_modes(case: Case, count: int) -> Reference:
     """The lowest modes of superelements, at most `count`."""
     found = modes_at_rest(case, count)
     frequency, shape = elastic(found, count)
-    own = found["eigenvalue"].values > 0.0
-    error = found["frequency_error"].values[own][:count] / frequency
+    error = found["frequency_error"].values[found["eigenvalue"].values > 0.0][:count] / frequency
     return Reference(frequency, error, frequency[None], shape, points_of(case, found), case, found)
 
 
@@ -357,5 +356,4 @@ def _modes(case: Case, structure: Discretized, count: int) -> MeshModes:
     """Elastic modes of a case on another mesh, without loads, contact and air."""
     if structure.sheet.density is None:
         structure = replace(structure, sheet=structure.sheet.weighed)
-    bare = replace(case, structure=structure, loads=(), contact=None, air=None)
-    return mesh_modes(bare, count)
+    return mesh_modes(replace(case, structure=structure, loads=(), contact=None, air=None), count)

@@ -78,8 +78,7 @@ class SpectralDensity(Checked):
         f, known = np.asarray(frequency, float), np.array(self.frequency)
         with np.errstate(divide="ignore"):
             between = np.exp(np.interp(np.log(f), np.log(known), np.log(self.value)))
-        within = (f >= known[0]) & (f <= known[-1])
-        return np.where(within, UNITS[self.unit][1] * between, 0.0)
+        return np.where((f >= known[0]) & (f <= known[-1]), UNITS[self.unit][1] * between, 0.0)
 
     @property
     def rms(self) -> float:
@@ -117,8 +116,7 @@ class SpectralDensity(Checked):
         >>> noise = fd.SpectralDensity([5.0, 50.0], [0.01, 0.01], "g2/Hz")
         >>> base = fd.BaseMotion("z", history=noise.history(10.0, seed=1))
         """
-        least = 1.0 / self.frequency[0]
-        duration = number("duration", duration, least=least, unit="s")
+        duration = number("duration", duration, least=1.0 / self.frequency[0], unit="s")
         seed = whole("seed", seed, least=0)
         count = int(np.ceil(PER_PERIOD * self.frequency[-1] * duration))
         check_memory("duration", f"{count:.3g} numbers", 80.0 * count, "take a shorter one")

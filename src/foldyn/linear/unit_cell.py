@@ -151,8 +151,7 @@ class UnitCell:
     copies: Copies = field(init=False)
 
     def __post_init__(self) -> None:
-        structure = of_kind("case", self.case, Case).structure
-        pattern = structure.pattern
+        pattern = of_kind("case", self.case, Case).structure.pattern
         if pattern is None:
             raise InputError(": its structure has no pattern that could repeat", "case")
         tolerance = number("tolerance", self.tolerance, above=0.0, below=NEAR_MISS)
@@ -523,8 +522,7 @@ def special_points(vectors: NDArray) -> dict[str, NDArray]:
 
 def checked_phases(phases: object, dimensions: int) -> NDArray[np.float64]:
     """Phases (n, d), rad, checked; for d = 1 they may be a list of numbers."""
-    values = phases.values if isinstance(phases, xarray.DataArray) else phases
-    array = numbers("phases", values)
+    array = numbers("phases", phases.values if isinstance(phases, xarray.DataArray) else phases)
     if array.ndim == 1 and dimensions == 1:
         array = array[:, None]
     if array.ndim != 2 or array.shape[1] != dimensions or not len(array):

@@ -208,9 +208,8 @@ class WaveSolver:
         check_count(self.count, basis.shape[1], phase)
         own_mass = basis.conj().T @ mass @ basis
         own = self._lowest_of(stiffness, own_mass)
-        values, turn = linalg.eigh(
-            *(own.conj().T @ (part @ own) for part in (stiffness, own_mass))
-        )  # far smaller rounding errors
+        # far smaller rounding errors
+        values, turn = linalg.eigh(*(own.conj().T @ (part @ own) for part in (stiffness, own_mass)))
         own = own @ turn
         scale = np.real(np.diag(stiffness)) / np.real(np.diag(own_mass))
         noise = np.maximum(_zero(scale), _noise(stiffness, own))

@@ -83,8 +83,7 @@ def corrected(
         norm = float(np.linalg.norm(residual))
         if not np.isfinite(norm):
             return None
-        factors = _bordered(family, z, p, row)
-        step = -lu_solve(factors, np.append(residual, 0.0), check_finite=False)
+        step = -lu_solve(_bordered(family, z, p, row), np.append(residual, 0.0), check_finite=False)
         if not np.isfinite(step).all():
             return None
         z, p = z + step[:-1], p + float(step[-1])
@@ -215,8 +214,7 @@ def _passes(family: Family, step: Step, first: Point) -> bool:
     if not 0.0 < along <= step.length or (weights * step.before.tangent) @ first.tangent <= 0.0:
         return False
     apart = np.append(first.z - step.before.z, first.p - step.before.p)
-    beside = weights @ apart**2 - along**2
-    return bool(beside <= (NEAR * step.length) ** 2)
+    return bool(weights @ apart**2 - along**2 <= (NEAR * step.length) ** 2)
 
 
 def _turns(family: Family, one: Point, other: Point) -> bool:

@@ -81,8 +81,7 @@ class Tangents:
         }
         row, column = np.divmod(self._union, max(size, 1))
         ends = np.searchsorted(row, np.arange(size + 1))
-        zeros = np.zeros(len(column))
-        self._matrix = sparse.csr_array((zeros, column, ends), (size, size))
+        self._matrix = sparse.csr_array((np.zeros(len(column)), column, ends), (size, size))
 
     def of(self, body: Assembly) -> Tangents:
         """Tangents of another body with respect to the same unknowns."""
@@ -307,8 +306,7 @@ class Equation:
         self.damping = self.projected(drag)
         self._moved = sparse.csr_array(self.basis.T @ nodal), sparse.csr_array(self.basis.T @ drag)
         self._back = np.zeros((0, 0))  # in a reduced equation: from the whole equation's unknowns
-        parts = [(part, k) for k, (part, _) in enumerate(self.drive.following)]
-        self._following = joined(parts)
+        self._following = joined([(part, k) for k, (part, _) in enumerate(self.drive.following)])
 
     @cached_property
     def rounding(self) -> float:
@@ -444,8 +442,7 @@ class Instants:
         for j, u, body in self._each(x):
             equation.tangents.put(body, u, out[j])
             if following.acts:
-                added = following_tangent(following, u, self._factor[j])
-                out[j] += equation.projected(added)
+                out[j] += equation.projected(following_tangent(following, u, self._factor[j]))
         return out
 
     def driving(self, omega: float) -> NDArray:

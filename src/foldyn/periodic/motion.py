@@ -146,8 +146,7 @@ def periodic_motion(
         if method == "shooting":
             orbit, spent = _shot(balance, guess, omega, steps, tolerance)
         else:
-            x = coefficients(balance, guess, omega)
-            found = balanced(balance, x, omega, tolerance)
+            found = balanced(balance, coefficients(balance, guess, omega), omega, tolerance)
             orbit, spent = Orbit.of(balance, found.x, omega), found.iterations
         floquet = orbit.multipliers(steps)
     truncation = orbit.truncation()

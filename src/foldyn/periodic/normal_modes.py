@@ -306,8 +306,7 @@ def _sharpened(family: Free, orbit: Orbit) -> Orbit:
 
 def _reach(equation: Equation, motions: NDArray) -> float:
     """Largest displacement of a node in motions (j, k) of the unknowns."""
-    nodes = equation.nodal(motions @ equation.basis.T)
-    return float(np.linalg.norm(nodes, axis=2).max())
+    return float(np.linalg.norm(equation.nodal(motions @ equation.basis.T), axis=2).max())
 
 
 def _follow(

@@ -60,8 +60,7 @@ def reduced(equation: Equation, modes: int, displacement: NDArray) -> Equation:
     shapes = equation.vibrations(stiffness, 0, modes - 1)[1]
     vectors = [*shapes.T, *_derivatives(equation, still, place, shapes, factors)]
     vectors += _static(equation, place, factors)
-    basis = _independent(equation.mass, np.array(vectors).T)
-    return _projected(equation, place, basis, factors)
+    return _projected(equation, place, _independent(equation.mass, np.array(vectors).T), factors)
 
 
 def _derivatives(

@@ -165,8 +165,7 @@ def response_curve(
     try:
         with reported(progress) as report, balance.threads:
             family = tracer.family(balance)
-            first = tracer.first(family, guess)
-            tracer.follow(family, first, branches, report)
+            tracer.follow(family, tracer.first(family, guess), branches, report)
     except KeyboardInterrupt:
         tracer.complete = False
         partial = _dataset(case, tracer, measure, began) if tracer.found else None
@@ -207,8 +206,7 @@ class _Tracer:
         """Family of motions of a balance along the varied parameter."""
         if self.by == "frequencies":
             return ByFrequency(balance, self.span, self.tolerance)
-        frequency = balance.equation.drive.frequency
-        return ByLevel(balance, self.span, self.tolerance, frequency)
+        return ByLevel(balance, self.span, self.tolerance, balance.equation.drive.frequency)
 
     def first(self, family: Any, guess: Any) -> Point:
         """Point at the first end of the range, with the tangent toward the second."""
@@ -340,13 +338,12 @@ def _warn_of_folds(found: list[_Found]) -> None:
 def _dataset(case: Case, tracer: _Tracer, measure: Any, began: float) -> Any:
     """Dataset of the points found; warns if they are not accurate."""
     orbits = [found.family.orbit(found.point.z, found.point.p) for found in tracer.found]
-    names = np.array([found.bifurcation for found in tracer.found], dtype="<U15")
     values = {
         "frequency": np.array([orbit.omega / (2.0 * np.pi) for orbit in orbits]),
         "level": np.array([orbit.level for orbit in orbits]),
         "amplitude": np.array([amplitude(orbit, measure) for orbit in orbits]),
         "stable": np.array([is_stable(found.floquet) for found in tracer.found]),
-        "bifurcation": names,
+        "bifurcation": np.array([found.bifurcation for found in tracer.found], dtype="<U15"),
         "branch": np.array([found.branch for found in tracer.found]),
         "periods": np.array([orbit.multiple for orbit in orbits]),
         "floquet": np.array([found.floquet for found in tracer.found]),
@@ -354,8 +351,7 @@ def _dataset(case: Case, tracer: _Tracer, measure: Any, began: float) -> Any:
     }
     _warn_of_folds(tracer.found)
     harmonics = tracer.found[0].family.balance.fourier.harmonics
-    truncation = float(values["truncation"].max())
-    warn_of_errors(orbits, harmonics, truncation, values.get("reduction"))
+    warn_of_errors(orbits, harmonics, float(values["truncation"].max()), values.get("reduction"))
     facts = {
         "by": tracer.by,
         "harmonics": harmonics,
@@ -365,8 +361,7 @@ def _dataset(case: Case, tracer: _Tracer, measure: Any, began: float) -> Any:
         "wall_seconds": time.perf_counter() - began,
     }
     units = "m" if measure is None else measure.units
-    origin = orbits[0].equation.origin
-    return points_dataset("response_curve", case, values, facts, units, origin)
+    return points_dataset("response_curve", case, values, facts, units, orbits[0].equation.origin)
 
 
 class Event(NamedTuple):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,8 +47,9 @@ class ShellTerm(BarsPlatesTerm):
         super().__init__(model, laws, like)
         self._crease, self._scale = crease, scale
 
-    def _with(self, model: BarsPlates) -> ShellTerm:
-        """Another sheet with the same mesh."""
+    def _with(self, **arrays: Any) -> ShellTerm:
+        """The sheet with other arrays on the same mesh."""
+        model = self.model._replace(**arrays)
         return ShellTerm(model, self._laws, self._crease, self._scale, self)
 
     def scale(self) -> NDArray:

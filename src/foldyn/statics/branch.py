@@ -110,8 +110,7 @@ def switch_branch(
         yield crossing
         first = _onto_branch(solver, crossing, mode, multiplicity, direction)
         yield first
-        away = first.point.u - crossing.point.u
-        yield from along(solver, first, plan, away)
+        yield from along(solver, first, plan, first.point.u - crossing.point.u)
 
     return record(stations(), progress, solver, problem, facts, until)
 

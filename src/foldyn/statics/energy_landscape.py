@@ -84,10 +84,9 @@ class Landscape:
             f"{'stable' if one.stable else 'unstable'} at {one.stroke:.4g} m ({one.energy:.3g} J)"
             for one in self.states
         )
-        pairs = [(k, k + 1) for k in range(len(self.stable) - 1)]
         barriers = ", ".join(
             f"{self.barrier(a, b):.3g} J there and {self.barrier(b, a):.3g} J back"
-            for a, b in pairs
+            for a, b in [(k, k + 1) for k in range(len(self.stable) - 1)]
         )
         ends = f"stroke {self.stroke[0]:.4g} to {self.stroke[-1]:.4g} m"
         over = f"; barriers {barriers}" if barriers else ""
@@ -266,8 +265,7 @@ def _between(
     ends : the two outer stations in words, for the message if no station is found.
     """
     try:
-        section = Section(solver, start, end)
-        return section.zero(lambda mark: function(mark.station), SHARP).station
+        return Section(solver, start, end).zero(lambda mark: function(mark.station), SHARP).station
     except LostError:
         raise ComputationError(
             f"no equilibrium was found between {ends} of the path: trace it with smaller steps"

@@ -83,8 +83,7 @@ class Plates:
 
     def force(self, contact: ContactTerm, q: NDArray) -> float:
         """Force that moves the planes along their motion, N; q (m,) of the body."""
-        pushed = contact.plane_forces(q) + contact.plane_friction(q)
-        return float((pushed * self._motion).sum())
+        return float(((contact.plane_forces(q) + contact.plane_friction(q)) * self._motion).sum())
 
     def bordered(
         self, matrix: sparse.csr_array, contact: ContactTerm, q: NDArray, project: Any
@@ -301,14 +300,12 @@ class OrigamiProblem(Problem):
 
     def reactions(self, u: NDArray, factor: float) -> NDArray:
         """Support reactions, N, on `case.reaction_dofs`."""
-        force = self.unbalanced(u, factor)
-        return self._ties.reactions @ force[: math.prod(self._shape)]
+        return self._ties.reactions @ self.unbalanced(u, factor)[: math.prod(self._shape)]
 
     def tangent(self, u: NDArray, factor: float, before: NDArray | None = None) -> sparse.csr_array:
         """Tangent stiffness (m, m), N/m, for steps; see `Assembly.step_tangent`."""
         q, old = self.dofs(u), None if before is None else self.dofs(before)
-        body = self.body(u, factor)
-        matrix = body.step_tangent(q, old)
+        matrix = self.body(u, factor).step_tangent(q, old)
         if self.following.acts:
             matrix = sparse.csr_array(matrix + self.load_stiffness(q, factor))
         matrix = self._ties.matrix(matrix)
@@ -344,8 +341,7 @@ class OrigamiProblem(Problem):
 
     def begin(self, factor: float) -> None:
         """Begin at a load factor, with friction at rest."""
-        at_rest = self.memories.body.energies(self.dofs(self.start()))
-        self.energy_at_rest = float(at_rest.sum())
+        self.energy_at_rest = float(self.memories.body.energies(self.dofs(self.start())).sum())
         self._evaluate(self.start(factor), factor)
         self.memories.tie()
 

@@ -391,8 +391,7 @@ class Solver:
         start = float(step @ residual)
         low, high, share = 0.0, 1.0, 1.0
         for _ in range(TRIALS):
-            there = self.problem.residual(u + share * step, factor)
-            along = float(step @ there)
+            along = float(step @ self.problem.residual(u + share * step, factor))
             if abs(along) <= SLACK * abs(start):
                 return share
             if along * start > 0.0 and share == 1.0:

@@ -119,8 +119,7 @@ class Memories:
 
     def branches(self, kept: Kept | None) -> NDArray:
         """State (b, 2) of all branches of the case at an accepted step, relaxing ones relaxed."""
-        parts = self._case.remembering
-        state = np.zeros((sum(part.count for part in parts), VARIABLES))
+        state = np.zeros((sum(part.count for part in self._case.remembering), VARIABLES))
         if kept is not None and kept.creases is not None:
             state[flowing(self._case, self.timed)] = kept.creases[1]
         return state

@@ -306,8 +306,7 @@ def _turn_warning(problem: OrigamiProblem, points: Sequence[Point], displacement
     at = int(np.argmax(turns > TURN))
     if turns[at] <= TURN:
         return ""
-    where = f"point {at} (load factor {points[at].factor:.6g})"
-    return far_turn(structure, turns[at], where)
+    return far_turn(structure, turns[at], f"point {at} (load factor {points[at].factor:.6g})")
 
 
 def _recorded(

@@ -82,8 +82,7 @@ def name_rigid_motions(
     x: NDArray, ties: Constraints, holds: sparse.csr_array | None = None
 ) -> list[str]:
     """Free rigid motions in words, such as "translation along x" and "rotation about y"."""
-    motions = rigid_motions(x)
-    space = _free_space(motions, ties, holds)
+    space = _free_space(rigid_motions(x), ties, holds)
     if not space.size:
         return []
     left, values, right = np.linalg.svd(space[3:])

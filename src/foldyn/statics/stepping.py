@@ -97,8 +97,7 @@ def arrive(solver: Solver, attempt: Attempt) -> Station:
     stiffness = solver.stiffness(attempt.u, attempt.factor)
     counted = solver.settings.stability and not solver.problem.slips(attempt.u)
     negative = stiffness.symmetric.negative() if counted else -1
-    relative = attempt.balance.relative
-    point = Point(attempt.u, attempt.factor, attempt.iterations, relative, negative)
+    point = Point(attempt.u, attempt.factor, attempt.iterations, attempt.balance.relative, negative)
     return Station(point, stiffness, stiffness.response(attempt.u, attempt.factor))
 
 

@@ -84,8 +84,7 @@ class Reached(Part):
 
     def __call__(self, displacement: NDArray, load_factor: float) -> bool:
         """Whether displacements (n, 3), m, reach it."""
-        moved = displacement[self.node, AXES.index(self.axis)]
-        return bool(moved / self.displacement >= 1.0)
+        return bool(displacement[self.node, AXES.index(self.axis)] / self.displacement >= 1.0)
 
 
 UNTIL = PartOf((Reached,), "analysis.until", "node, axis and displacement")
@@ -410,16 +409,14 @@ def _name(mode: NDArray) -> str:
 def free_modes(problem: OrigamiProblem, unstrained: Unstrained) -> NDArray:
     """Orthonormal motions (m, k) of the free dofs that strain nothing."""
     free = problem.free
-    ties = problem.case.constraints
-    matrix = ties.matrix(unstrained.tangent)[free][:, free].tocsc()
+    matrix = problem.case.constraints.matrix(unstrained.tangent)[free][:, free].tocsc()
     diagonal = matrix.diagonal()
     if not (diagonal > 0.0).all():
         return _unresisted(problem, diagonal)
     scale = 1.0 / np.sqrt(diagonal)  # scaled so that all pivots are of similar size
     scaled = sparse.csc_array(matrix.multiply(scale[:, None]).multiply(scale[None, :]))
     size = len(free)
-    shifted = sparse.csc_array(scaled + SHIFT * sparse.eye_array(size, format="csc"))
-    factors = factorized(shifted)
+    factors = factorized(sparse.csc_array(scaled + SHIFT * sparse.eye_array(size, format="csc")))
     if _softest(factors, size) > SUSPICIOUS:
         return np.zeros((len(diagonal) + len(problem.held), 0))
     values, vectors = softest_modes(scaled, factors, MOST_MODES, dense=600, shift=-SHIFT)

@@ -55,8 +55,9 @@ class BarsHingesTerm(SheetTerm):
         self._softness, self.offsets = softness, len(softness) if softness.any() else 0
         self.size, self.rows = model.rest.size, len(model.rest)
 
-    def _with(self, model: BarsHinges) -> BarsHingesTerm:
-        """Term for another model whose elements have the same nodes."""
+    def _with(self, **arrays: NDArray) -> BarsHingesTerm:
+        """Term with other arrays of the model, whose elements keep their nodes."""
+        model = self.model._replace(**arrays)
         return BarsHingesTerm(model, self._turning, self._laws, self._softness, self)
 
     def _nodal(self, q: NDArray) -> NDArray:
@@ -136,8 +137,7 @@ class BarsHingesTerm(SheetTerm):
         """Largest turn of a hinge, or of a bar relative to the other bars; inf on penetration."""
         shift, (a, b) = self._nodal(other - q), self.model.bars.T
         apart = np.linalg.norm(shift[b] - shift[a], axis=1)
-        length = np.linalg.norm(self.model.bar_vector, axis=1)
-        bars = float((apart / length).max(initial=0.0))
+        bars = float((apart / np.linalg.norm(self.model.bar_vector, axis=1)).max(initial=0.0))
         return largest_turn(bars, self.angles(q), self.angles(other))
 
     def scale(self) -> NDArray:
@@ -174,21 +174,20 @@ class BarsHingesTerm(SheetTerm):
         angle, found = dihedrals_and_gradients(place, np.ascontiguousarray(model.hinges[rows]))
         start = 12 * np.arange(len(rows) + 1)
         gradient = sparse.csr_array((found.ravel(), columns.ravel(), start), (len(rows), self.size))
-        offset = angle - model.hinge_rest[rows]
-        return SoftHinges(offset, model.hinge_stiffness[rows], gradient)
+        return SoftHinges(angle - model.hinge_rest[rows], model.hinge_stiffness[rows], gradient)
 
     def soft_tangent(self, q: NDArray, slope: NDArray) -> sparse.csr_array:
         """Tangent (m, m) of the superlinear hinges alone; see `SheetTerm`."""
-        alone = self.nominal(q).hinges_alone().model
-        stiffness = np.zeros(len(alone.hinges))
-        stiffness[self._soft] = alone.hinge_stiffness[self._soft] * slope
-        return self._with(alone._replace(hinge_stiffness=stiffness)).tangent(q)
+        alone = self.nominal(q).hinges_alone()
+        stiffness = np.zeros(len(alone.model.hinges))
+        stiffness[self._soft] = alone.model.hinge_stiffness[self._soft] * slope
+        return alone._with(hinge_stiffness=stiffness).tangent(q)
 
     def weakened(self, hinges: NDArray) -> BarsHingesTerm:
         """The sheet without the stiffness of some superlinear hinges; see `SheetTerm`."""
         stiffness = self.model.hinge_stiffness.copy()
         stiffness[self._soft[hinges]] = 0.0
-        return self._with(self.model._replace(hinge_stiffness=stiffness))
+        return self._with(hinge_stiffness=stiffness)
 
     @property
     def rest_angles(self) -> NDArray:
@@ -246,20 +245,17 @@ class BarsHingesTerm(SheetTerm):
             if law.follows_rest:
                 parameters[self._turning[part]] = law.parameters(rest[part])
             start += count
-        model = self.model._replace(
-            hinge_rest=angle, hinge_parameters=parameters, hinge_offset=offset
-        )
-        return self._with(model)
+        return self._with(hinge_rest=angle, hinge_parameters=parameters, hinge_offset=offset)
 
     def actuated(self, numbers: NDArray) -> tuple[BarsHingesTerm, NDArray, NDArray]:
         """A copy with rest angles that change in place; see `SheetTerm`."""
         model = self.model
-        own = model._replace(
+        own = self._with(
             hinge_rest=model.hinge_rest.copy(), hinge_parameters=model.hinge_parameters.copy(),
             hinge_offset=model.hinge_offset.copy(),
         )  # fmt: skip
         rows = np.append(self._turning, self._turning[: self.offsets])
-        return self._with(own), rows[numbers], np.arange(len(numbers))
+        return own, rows[numbers], np.arange(len(numbers))
 
     def turned(self) -> tuple[NDArray, NDArray]:
         """Rest angles (rad) of actuated hinges, and their rows; see `SheetTerm`."""
@@ -283,36 +279,30 @@ class BarsHingesTerm(SheetTerm):
             return self, np.arange(self.rows)
         order = node_order(self.model)
         model, rows = renumber(self.model, order)
-        turning = ranks(rows)[self._turning]
-        return BarsHingesTerm(model, turning, self._laws, self._softness), order
+        return BarsHingesTerm(model, ranks(rows)[self._turning], self._laws, self._softness), order
 
     def hinges_alone(self) -> BarsHingesTerm:
         """The sheet with its hinges only; see `SheetTerm`."""
-        return self._with(self.model._replace(bar_runs=self.model.bar_runs[:0]))
+        return self._with(bar_runs=self.model.bar_runs[:0])
 
     def anchored(self, place: NDArray) -> BarsHingesTerm:
         """See `Term`."""
         model = self.model
         bars, hinges = (place[::3][nodes].min(axis=1) == 0 for nodes in (model.bars, model.hinges))
         return self._with(
-            model._replace(
-                bar_stiffness=model.bar_stiffness * bars,
-                hinge_stiffness=model.hinge_stiffness * hinges,
-            )
+            bar_stiffness=model.bar_stiffness * bars, hinge_stiffness=model.hinge_stiffness * hinges
         )
 
     def nominal(self, q: NDArray) -> BarsHingesTerm:
         """The model at nominal stiffness, about its state at q; see `SheetTerm`."""
         runs = self.model.hinge_runs.copy()
         runs[:, 2] = 0  # the linear law
-        model, offset = self.model, np.zeros_like(self.model.hinge_offset)
-        return self._with(
-            model._replace(hinge_rest=self.angles(q), hinge_runs=runs, hinge_offset=offset)
-        )
+        offset = np.zeros_like(self.model.hinge_offset)
+        return self._with(hinge_rest=self.angles(q), hinge_runs=runs, hinge_offset=offset)
 
     def unstrained(self, q: NDArray) -> Unstrained:
         """The model with q as its unstrained state; see `SheetTerm`."""
-        sheet = self._with(self.unstrained_model(q))
+        sheet = self._with(**self.unstrained_model(q)._asdict())
         rest = np.zeros(self.size)
         return Unstrained(
             sheet.tangent(rest), sheet.hinges_alone().tangent(rest), partial(stretch, sheet.model)

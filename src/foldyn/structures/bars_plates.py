@@ -70,9 +70,9 @@ class BarsPlatesTerm(SheetTerm):
             model.bars, np.zeros(0, np.int64), (), np.zeros(0), like._bars if like else None
         )
 
-    def _with(self, model: BarsPlates) -> Self:
-        """Another sheet whose elements have the same dofs."""
-        return type(self)(model, self._laws, self)
+    def _with(self, **arrays: Any) -> Self:
+        """The sheet with other arrays of its model, whose elements keep their dofs."""
+        return type(self)(self.model._replace(**arrays), self._laws, self)
 
     def _split(self, q: NDArray) -> tuple[NDArray, NDArray]:
         """Displacements (n, 3) and rotations (r,)."""
@@ -90,9 +90,9 @@ class BarsPlatesTerm(SheetTerm):
     def tangent(self, q: NDArray, floor: float = -np.inf) -> sparse.csr_array:
         """See `SheetTerm`; with the dofs of explicit methods, right where these are in balance."""
         bars = partial(self._bars.tangent, q[: self._nodal])
-        if not len(self.model.unmoved):
-            return self._assembled(q, floor, bars)
         whole = self._assembled(q, floor, bars)
+        if not len(self.model.unmoved):
+            return whole
         spread = self._spread(turned_plates(self.model, self._split(q)[0]).gradient)
         return sparse.csr_array(spread.T @ whole @ spread)
 
@@ -158,8 +158,7 @@ class BarsPlatesTerm(SheetTerm):
         if len(self.model.bars.bar_runs):
             data[pattern.bars] = bars().data
         add_plates_tangent(self.model, pattern, *self._split(q), floor, data)
-        entries = (data, pattern.indices, pattern.indptr)
-        return sparse.csr_array(entries, (self.size, self.size))
+        return sparse.csr_array((data, pattern.indices, pattern.indptr), (self.size, self.size))
 
     def blocks(self) -> SparseBlocks:
         """See `SheetTerm`."""
@@ -279,9 +278,8 @@ class BarsPlatesTerm(SheetTerm):
             first = np.where(turns[:, 0] >= 0, turns[:, 0], turns[:, 1])
             turns, per_hidden = np.stack([first, first], axis=1), -0.5 * per_hidden
         hidden = np.where(turns >= 0, self._nodal + turns, NO_DOF)
-        corners = self.model.bars.rest[nodes]
         return FoldHinges(
-            np.arange(len(nodes)), nodes, corners, hidden, per_hidden,
+            np.arange(len(nodes)), nodes, self.model.bars.rest[nodes], hidden, per_hidden,
             self.model.fold_rest, self.model.fold_stiffness, np.zeros(len(nodes)),
             np.arange(len(nodes)),
         )  # fmt: skip
@@ -293,16 +291,15 @@ class BarsPlatesTerm(SheetTerm):
         if law.follows_rest:
             parameters = law.parameters(folds).reshape(-1, 4)
         bends = np.array(rest[len(folds) :], float)
-        model = self.model._replace(fold_rest=folds, fold_parameters=parameters, bend_rest=bends)
-        return self._with(model)
+        return self._with(fold_rest=folds, fold_parameters=parameters, bend_rest=bends)
 
     def actuated(self, numbers: NDArray) -> tuple[Self, NDArray, NDArray]:
         """See `SheetTerm`."""
         model = self.model
-        own = model._replace(
+        own = self._with(
             fold_rest=model.fold_rest.copy(), fold_parameters=model.fold_parameters.copy()
         )
-        return self._with(own), np.asarray(numbers), np.arange(len(numbers))
+        return own, np.asarray(numbers), np.arange(len(numbers))
 
     def turned(self) -> tuple[NDArray, NDArray]:
         """See `SheetTerm`."""
@@ -311,26 +308,21 @@ class BarsPlatesTerm(SheetTerm):
     # ------------------------------------------------------------------ other bodies
     def hinges_alone(self) -> Self:
         """See `SheetTerm`."""
-        bars = self.model.bars._replace(bar_runs=self.model.bars.bar_runs[:0])
-        return self._with(self.model._replace(bars=bars))
+        return self._with(bars=self._bars.hinges_alone().model)
 
     def anchored(self, place: NDArray) -> Self:
         """See `Term`; a plate lies at the nodes of its bends and at the ends of its edges."""
         model, place = self.model, place[: self._nodal]
         edges = place[::3][model.hinges[model.rotation_hinge, :2]].min(axis=1)
-        lowest = np.append(
-            place[::3][model.hinges].min(axis=1), edges[::-1]
-        )  # number -1 comes last
+        # number -1 comes last
+        lowest = np.append(place[::3][model.hinges].min(axis=1), edges[::-1])
         plates = np.array(
             [lowest[model.angle[a:b]].min(initial=1) for a, b in pairwise(model.start)]
         )
-        entries = np.repeat(plates == 0, np.diff(model.entry))
         return self._with(
-            model._replace(
-                bars=self._bars.anchored(place).model,
-                fold_stiffness=model.fold_stiffness * (lowest[: len(model.fold_rest)] == 0),
-                stiffness=model.stiffness * entries,
-            )
+            bars=self._bars.anchored(place).model,
+            fold_stiffness=model.fold_stiffness * (lowest[: len(model.fold_rest)] == 0),
+            stiffness=model.stiffness * np.repeat(plates == 0, np.diff(model.entry)),
         )
 
     def unstrained(self, q: NDArray) -> Unstrained | None:
@@ -338,9 +330,7 @@ class BarsPlatesTerm(SheetTerm):
         model, bars = self.model, self._bars.unstrained_model(q[: self._nodal])
         angle, folds = self.angles(q), len(model.fold_rest)
         sheet = self._with(
-            model._replace(
-                bars=bars, fold_rest=angle[:folds], bend_rest=angle[folds:], code=LinearHinge.code
-            )
+            bars=bars, fold_rest=angle[:folds], bend_rest=angle[folds:], code=LinearHinge.code
         )
         rest = np.zeros(self.size)
         return Unstrained(
@@ -401,7 +391,7 @@ class ClampsTerm(BarsPlatesTerm):
 
     def nominal(self, q: NDArray) -> ClampsTerm:
         """See `Term`."""
-        return self._with(self.model._replace(bend_rest=self.angles(q)))
+        return self._with(bend_rest=self.angles(q))
 
 
 def positions(model: BarsPlates) -> NDArray:

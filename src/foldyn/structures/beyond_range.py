@@ -145,8 +145,7 @@ def _relative_stiffness(pattern: Pattern, sheet: Sheet, folds: NDArray) -> NDArr
 def _strips(pattern: Pattern) -> NDArray[np.bool_]:
     """Mask (nf,) of creases that meet no others, at non-square panels with two or more creases."""
     lines = Lines.of(pattern.creases)
-    once = pattern.creases[lines.first]
-    count = np.bincount(once.ravel(), minlength=len(pattern.vertices))
+    count = np.bincount(pattern.creases[lines.first].ravel(), minlength=len(pattern.vertices))
     alone = (count[pattern.creases] == 1).all(axis=1)
     length = lengths(pattern.vertices, pattern.creases)
     aspect = pattern.face_areas[pattern.crease_faces].max(axis=1) / length**2
@@ -178,8 +177,7 @@ def _slenderness(
     thickness = sheet.values("thickness", len(pattern.faces))[faces].max(axis=1, initial=0.0)
     sine = np.linalg.norm(np.cross(*pattern.face_normals[faces].transpose(1, 0, 2)), axis=1)
     across = lengths(pattern.vertices, edges) * sine
-    share = np.divide(thickness, across, out=np.zeros(len(edges)), where=sine > SMOOTH)
-    return share.round(DIGITS)
+    return np.divide(thickness, across, out=np.zeros(len(edges)), where=sine > SMOOTH).round(DIGITS)
 
 
 THICK = 0.2  # largest thickness of a thin sheet, relative to the shortest edge of a panel
@@ -265,8 +263,7 @@ def kept_apart(structure: Discretized, one: int, other: int) -> str:
     panels that are pushed hard pass through each other, however small the steps.
     """
     ends = {one, other}
-    count = len(Lines.of(structure.pattern.creases).first)
-    creases = structure.edge_nodes[:count].tolist()
+    creases = structure.edge_nodes[: len(Lines.of(structure.pattern.creases).first)].tolist()
     fold = any(ends == {*pair} for row in creases for pair in pairwise(row) if ends & {*row})
     kind = "fold" if fold else "bend"
     law = structure.fold_law if fold else getattr(structure, "bend_law", None)

@@ -70,8 +70,7 @@ def bend_stiffness(mesh: Mesh, pattern: Pattern, sheet: Sheet, merlin2: bool) ->
     count = len(pattern.faces)
     g = sheet.values("bending_modulus", count)[mesh.inner_panel]
     t = sheet.values("thickness", count)[mesh.inner_panel]
-    on_diagonal = mesh.centers[mesh.inner_panel] < 0
-    if on_diagonal.all():
+    if (mesh.centers[mesh.inner_panel] < 0).all():
         return bend_stiffness_per_length(length, g, t) * length
     per_length = np.empty(len(length))
     _, first, spokes = np.unique(mesh.inner_panel, return_index=True, return_counts=True)
@@ -123,8 +122,7 @@ def bar_areas(
     kinds, kind = sheet.kinds(len(pattern.faces))
     x = mesh.nodes
     inner = np.zeros(len(mesh.inner))
-    inner_length = lengths(x, mesh.inner)
-    inner_sum = np.bincount(mesh.inner_panel, inner_length, minlength=len(pattern.faces))
+    inner_sum = np.bincount(mesh.inner_panel, lengths(x, mesh.inner), minlength=len(pattern.faces))
     triangle_area = 0.5 * np.linalg.norm(double_areas(x, mesh.triangles), axis=1)
     panel_area = np.bincount(mesh.triangle_panel, triangle_area, len(pattern.faces))
     inner_first = np.searchsorted(mesh.inner_panel, np.arange(len(pattern.faces) + 1))

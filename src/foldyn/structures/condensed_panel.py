@@ -135,8 +135,7 @@ def _facet_slopes(points: NDArray, corners: int) -> NDArray:
 def spoke_turns(points: NDArray, corners: int) -> NDArray:
     """Turns (m, points) of the spokes, for heights of the points."""
     slopes = _planes(points, corners)
-    along = points[:corners] - points[corners]
-    return _across(along, np.roll(slopes, 1, axis=0) - slopes)
+    return _across(points[:corners] - points[corners], np.roll(slopes, 1, axis=0) - slopes)
 
 
 def _across(along: NDArray, slopes: NDArray) -> NDArray:
@@ -249,8 +248,7 @@ def _cut(m: int, center: bool, n: int) -> Cut:
     row, column = pairs_within(dofs).T
     source = (36 * np.repeat(np.arange(facets), n * n)[:, None] + np.arange(36)).ravel()
     for _ in range(2):  # basis' A basis: first by rows, then by columns
-        places = row, count * column + source
-        part = sparse.coo_array((value, places), shape=(size, count * size))
+        part = sparse.coo_array((value, (row, count * column + source)), shape=(size, count * size))
         found = sparse.coo_array(basis.T @ sparse.csr_array(part))
         value, (column, rest) = found.data, found.coords
         row, source = np.divmod(rest, count)

@@ -320,14 +320,13 @@ class Discretized:
         faces = self.pattern.faces if self.pattern is not None else ()
         welds = self.pattern.welds.tolist() if self.pattern is not None else []
         count = max(len(faces), int(self.triangle_panel.max(initial=-1)) + 1)
-        area = 0.5 * np.linalg.norm(double_areas(self.nodes, self.triangles), axis=1)
         return Surface(
             nodes=self.nodes,
             faces=faces,
             centers=self.centers,
             triangles=self.triangles,
             triangle_panel=self.triangle_panel,
-            triangle_area=area,
+            triangle_area=0.5 * np.linalg.norm(double_areas(self.nodes, self.triangles), axis=1),
             areal_density=self.sheet.values("areal_density", count) * self.board_share,
             welds=tuple((low, high) for low, high in welds),
         )

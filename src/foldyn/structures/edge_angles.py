@@ -256,11 +256,10 @@ def plates_model(
     clamps : (c, 3) nodes of the triangles at clamped edges.
     by_folds : whether the dofs beside a fold are those of explicit methods.
     """
-    length = lengths(nodes, bars)
     return BarsPlates(
         bars=mechanics.build(nodes, bars, bar_stiffness, bar_law, ()),
         rotations=len(plates.rotation_hinge),
-        per_reach=1.0 / float(np.sqrt((length**2).mean())) if len(bars) else 1.0,
+        per_reach=1.0 / float(np.sqrt((lengths(nodes, bars) ** 2).mean())) if len(bars) else 1.0,
         hinges=np.concatenate([folds, bends, clamps[:, [0, 1, 2, 0]]]).astype(np.int64),
         wings=clamp_points(nodes, clamps)[:, 3] - nodes[clamps[:, :2]].mean(axis=1),
         unmoved=hinge_angles(nodes, folds) if by_folds else np.zeros(0),

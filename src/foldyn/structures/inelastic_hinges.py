@@ -104,7 +104,6 @@ def memory(parts: tuple[Remembering, ...], body: Assembly) -> HingeMemory:
     for part in parts:
         hinges, branches = part.hinges, part.branches
         n, b = len(hinges.rest), len(branches)
-        group = list(body.energy_groups).index(f"strain_{part.kind}s")
         own = {
             "dofs": hinge_dofs(hinges.nodes, hinges.hidden),
             "corners": hinges.corners,
@@ -112,7 +111,7 @@ def memory(parts: tuple[Remembering, ...], body: Assembly) -> HingeMemory:
             "rest": hinges.rest,
             "row": hinges.row,
             "stiffness": part.stiffness,
-            "group": np.full(n, group),
+            "group": np.full(n, list(body.energy_groups).index(f"strain_{part.kind}s")),
             "arm": _arms(hinges.corners),
             "first": count + b * np.arange(n),
             "code": np.tile([branch.code for branch in branches], n),

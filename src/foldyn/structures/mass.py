@@ -215,13 +215,11 @@ def condensed(surface: Surface) -> sparse.csr_array:
     The shape hardly depends on Poisson's ratio, which is set to 0.3.
     """
     panels = condensed_panels(surface)
-    plated = np.isin(np.arange(len(surface.faces)), list(panels))
-    mass = consistent(_without(surface, plated))
+    mass = consistent(_without(surface, np.isin(np.arange(len(surface.faces)), list(panels))))
     for size in {len(matrix) for matrix in panels.values()}:
         alike = [p for p, matrix in panels.items() if len(matrix) == size]
         nodes = np.array([surface.nodes_of(p) for p in alike])
-        matrices = np.array([panels[p] for p in alike])
-        mass = mass + of_elements(nodes, matrices, len(surface.nodes))
+        mass = mass + of_elements(nodes, np.array([panels[p] for p in alike]), len(surface.nodes))
     return mass
 
 
@@ -303,8 +301,7 @@ def _shares(x: NDArray, triangles: NDArray, part: NDArray) -> NDArray:
     wanted += np.einsum("t,ta,tb->ab", part / 12.0, s, s)
     missing = (wanted - np.einsum("k,ka,kb->ab", start, x, x)).ravel()
     # changes of the shares that preserve total and center of mass
-    kept = np.column_stack([np.ones(len(x)), x])
-    left, singular, _ = np.linalg.svd(kept)
+    left, singular, _ = np.linalg.svd(np.column_stack([np.ones(len(x)), x]))
     free = left[:, int((singular > 1e-9 * singular[0]).sum()) :]
     products = np.einsum("ka,kb->abk", x, x).reshape(9, -1)
     change = free @ np.linalg.lstsq(products @ free, missing, rcond=1e-9)[0]

@@ -102,8 +102,7 @@ def n4b5(pattern: Pattern) -> Mesh:
         return _cut(list(pattern.faces[panel]), pattern, panel)
 
     none = np.full(len(pattern.faces), -1)
-    remedy = f"it is bent, or not convex; {CUT}"
-    return _mesh(pattern, pattern.vertices, none, diagonals, remedy)
+    return _mesh(pattern, pattern.vertices, none, diagonals, f"it is bent, or not convex; {CUT}")
 
 
 def _mesh(

@@ -210,13 +210,11 @@ def _quadratic(points: NDArray, cut: Cut, radius: float | None = None) -> PanelM
 def _cut(points: int, triangles: NDArray, at: NDArray, edges: list[NDArray]) -> Cut:
     """Cut with the given number of points, panel corners `at`, and `edges` with their ends."""
     side, _, ends = sides_of(triangles)
-    middles = across_edges(edges, ends, points)
     along = [
         np.stack([between, edge[1:]], axis=1).ravel()[:-1]
-        for edge, (between, _) in zip(edges, middles, strict=True)
+        for edge, (between, _) in zip(edges, across_edges(edges, ends, points), strict=True)
     ]
-    elements = np.concatenate([triangles, points + side], axis=1)
-    return Cut(ends, elements, at, along)
+    return Cut(ends, np.concatenate([triangles, points + side], axis=1), at, along)
 
 
 class Unknowns(NamedTuple):
@@ -314,8 +312,7 @@ def _plan(cut: Cut, bowing: bool, gives: bool) -> Plan:
         i, j = np.tril_indices(len(own))
         keys.append(own[i] * size + own[j])
     found, place = np.unique(np.concatenate(keys), return_inverse=True)
-    pairs = np.stack(np.divmod(found, size), axis=1)
-    condensing = Condensing(pairs, size, size - unknowns.free)
+    condensing = Condensing(np.stack(np.divmod(found, size), axis=1), size, size - unknowns.free)
     own, *bows = np.split(condensing.places[place], np.cumsum([*map(len, keys)])[:-1])
     places = np.full(len(row), -1, np.int32)
     places[lower] = COUNT * own
@@ -336,8 +333,7 @@ def _condensed(kinds: Sequence[Kind], meshes: Sequence[PanelMesh]) -> NDArray:
     shapes = np.repeat(plan.unknowns.axes[:, :, None], COUNT, axis=2)
     for k, points in enumerate(cut.along):
         edge = _edge(x[points], x[cut.at[k]], x[cut.at[(k + 1) % len(cut.at)]])
-        ends = rigid[[k, (k + 1) % len(cut.at)]]
-        moves = _moves(edge, radius if gives else None, ends)
+        moves = _moves(edge, radius if gives else None, rigid[[k, (k + 1) % len(cut.at)]])
         if plan.bows:
             moves.insert(0, np.broadcast_to(edge.normal * ~straight[:, k], moves[0].shape))
             for lane, (kind, mesh) in enumerate(zip(kinds, meshes, strict=True)):
@@ -348,8 +344,7 @@ def _condensed(kinds: Sequence[Kind], meshes: Sequence[PanelMesh]) -> NDArray:
     stiffness = np.repeat(1.0 / (1.0 - nu[None] ** 2), len(cut.elements), axis=0)
     if gives:
         for corner, stiff in zip(cut.at, rigid, strict=True):
-            there = (cut.elements[:, :3] == corner).any(axis=1)
-            stiffness[there] *= np.where(stiff, STIFF, 1.0)
+            stiffness[(cut.elements[:, :3] == corner).any(axis=1)] *= np.where(stiff, STIFF, 1.0)
     slopes = squares(x[cut.elements[:, :3]], stiffness)
     add_triangles(
         cut.elements, plan.unknowns.starts, plan.places, shapes.ravel(), slopes.ravel(), PRODUCTS,

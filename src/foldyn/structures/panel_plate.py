@@ -156,8 +156,7 @@ def meshed(
     nodes = everywhere[first]
 
     def found(wanted: NDArray) -> NDArray:
-        apart = np.linalg.norm(nodes[None] - wanted[:, None], axis=2)
-        return apart.argmin(axis=1)
+        return np.linalg.norm(nodes[None] - wanted[:, None], axis=2).argmin(axis=1)
 
     steps = np.linspace(0.0, 1.0, n + 1)[:, None]
     edges = [found(a + steps * (b - a)) for a, b in zip(x, np.roll(x, -1, axis=0), strict=True)]
@@ -168,8 +167,7 @@ def sides_of(triangles: NDArray) -> tuple[NDArray, NDArray, NDArray]:
     """Index and sign (nt, 3) of triangles' sides, positive if from low to high; ends (s, 2)."""
     pairs = np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2)
     ends, side = np.unique(np.sort(pairs, axis=2).reshape(-1, 2), axis=0, return_inverse=True)
-    sign = np.where(pairs[:, :, 0] < pairs[:, :, 1], 1.0, -1.0)
-    return side.reshape(-1, 3), sign, ends
+    return side.reshape(-1, 3), np.where(pairs[:, :, 0] < pairs[:, :, 1], 1.0, -1.0), ends
 
 
 def across_edges(edges: Sequence[NDArray], ends: NDArray, heights: int) -> list[tuple]:

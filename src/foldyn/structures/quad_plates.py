@@ -346,8 +346,7 @@ def _curvatures(x: NDArray) -> tuple[NDArray, NDArray]:
         both = a[:, :, i] * b[:, :, j] + a[:, :, j] * b[:, :, i]
         return a[:, :, i] * a[:, :, j] * xi + b[:, :, i] * b[:, :, j] * eta + both * cross
 
-    curvature = np.stack([second(0, 0), second(1, 1), second(0, 1)], axis=2)
-    return curvature, np.linalg.det(jacobian)
+    return np.stack([second(0, 0), second(1, 1), second(0, 1)], axis=2), np.linalg.det(jacobian)
 
 
 def _mean_slope(x: NDArray, k: int, weights: NDArray) -> NDArray:

@@ -47,8 +47,7 @@ def on_plate(points: NDArray, corners: NDArray) -> tuple[NDArray, NDArray]:
     arm = points - corners[0]
     second = np.cross(arm, b) @ normal / area
     third = np.cross(a, arm) @ normal / area
-    off = np.abs(arm @ normal) / size
-    return np.stack([1.0 - second - third, second, third], axis=1), off
+    return np.stack([1.0 - second - third, second, third], axis=1), np.abs(arm @ normal) / size
 
 
 def checked_panels(rigid: Any, count: int, field: str = "rigid") -> str | tuple[int, ...] | None:

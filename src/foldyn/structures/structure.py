@@ -355,10 +355,9 @@ class Structure(Discretized):
     @cached_property
     def _chords(self) -> tuple[Chords, Chords]:
         """Turns of the hinges, folds first, per curvature of panels; the same for the clamps."""
-        hinges = np.concatenate([kind.nodes for kind in self.hinge_kinds])
         of_hinges, of_clamps = (
             chords(self.nodes, self.triangles, self.triangle_panel, rows)
-            for rows in (hinges, self.clamps)
+            for rows in (np.concatenate([kind.nodes for kind in self.hinge_kinds]), self.clamps)
         )
         return of_hinges, of_clamps
 

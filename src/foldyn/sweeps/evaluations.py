@@ -130,8 +130,7 @@ def _read(file: Path) -> tuple[str, Evaluation]:
         if any(array.dtype.kind not in "iuf" for array in values.values()):
             raise ValueError
         failure, warnings = str(kept["failure"]), str(kept["warnings"])
-        found = Evaluation(values, failure, warnings, float(kept["seconds"]))
-        return str(kept["stamp"]), found
+        return str(kept["stamp"]), Evaluation(values, failure, warnings, float(kept["seconds"]))
 
 
 def _write(file: Path, stamp: str, found: Evaluation) -> None:

@@ -158,9 +158,7 @@ def nearest_of(result: xr.Dataset, along: str, value: float) -> int:
 
 
 @_measure(FRF, units="", doc="magnitude of the response at a frequency (unit of the response)")
-def _response(
-    result: xr.Dataset, case: Case, node: int, axis: str, frequency: float
-) -> float:  # fmt: skip
+def _response(result: xr.Dataset, case: Case, node: int, axis: str, frequency: float) -> float:
     response = result[quantity_of(result)].transpose("frequency", ...).sel(node=node, axis=axis)
     return float(np.abs(response.values[nearest_of(result, "frequency", frequency)]))
 
@@ -186,9 +184,7 @@ def _peak_frequencies(
 def _peak_damping(result: xr.Dataset, case: Case, node: int, axis: str | None = None) -> float:
     f, size, peaks, kind = curve_of(result, node, axis)
     near = _highest(peaks, "frequency")
-    if np.isnan(near):
-        return near
-    return half_power(f, size, near=near, quantity=kind).damping_ratio
+    return near if np.isnan(near) else half_power(f, size, near=near, quantity=kind).damping_ratio
 
 
 @_measure(MOTION, doc="damping ratio by logarithmic decrement")
@@ -204,9 +200,7 @@ def _displacement(result: xr.Dataset, case: Case, node: int, axis: str) -> float
 
 
 @_measure(MOTION, units="m", doc="displacement at a time (s)")
-def _displacement_at(
-    result: xr.Dataset, case: Case, node: int, axis: str, time: float
-) -> float:  # fmt: skip
+def _displacement_at(result: xr.Dataset, case: Case, node: int, axis: str, time: float) -> float:
     moved = sampled(result, "displacement")[nearest_of(result, "time", time)]
     return float(moved.sel(node=node, axis=axis))
 
@@ -228,8 +222,7 @@ def _minimum(result: xr.Dataset, case: Case, node: int, axis: str) -> float:
 
 @_measure(MOTION, units="m s", doc="integral of a displacement over time")
 def _integral(result: xr.Dataset, case: Case, node: int, axis: str) -> float:
-    moved = result["displacement"].sel(node=node, axis=axis)
-    return float(moved.integrate("time"))
+    return float(result["displacement"].sel(node=node, axis=axis).integrate("time"))
 
 
 @_measure(MOTION, units="m2", doc="mean square of a displacement over time")
@@ -376,9 +369,7 @@ def _limit_interval(result: xr.Dataset, case: Case) -> NDArray:
 
 
 @_measure(PATH, doc="load factor where a node has moved so far (m)")
-def _load_at(
-    result: xr.Dataset, case: Case, node: int, axis: str, displacement: float
-) -> float:  # fmt: skip
+def _load_at(result: xr.Dataset, case: Case, node: int, axis: str, displacement: float) -> float:
     return load_at(result, 3 * node + AXES.index(axis), displacement, case).factor
 
 

@@ -121,8 +121,7 @@ def _indices(
         for k, word in enumerate(found.names)
     ]
     yield Table(header, rows, caption, digits=3)
-    draw = partial(plots.plot_sobol_indices, found)
-    yield from album.figure(f"indices-{name}", caption, draw)
+    yield from album.figure(f"indices-{name}", caption, partial(plots.plot_sobol_indices, found))
 
 
 def _points(sweep: xr.Dataset) -> Iterator[Section]:
@@ -151,9 +150,7 @@ def _points(sweep: xr.Dataset) -> Iterator[Section]:
 def _flat(sweep: xr.Dataset) -> xr.Dataset:
     """The sweep with its points along a single dimension."""
     kept = sweep[[*measures_of(sweep), "failure", "seconds"]]
-    if not is_grid(sweep):
-        return kept
-    return kept.stack({POINT: keys_of(sweep)}, create_index=False)
+    return kept.stack({POINT: keys_of(sweep)}, create_index=False) if is_grid(sweep) else kept
 
 
 def _failures(sweep: xr.Dataset) -> Table:
@@ -169,9 +166,7 @@ def _failures(sweep: xr.Dataset) -> Table:
     return Table([*(label(sweep[name]) for name in names), "why"], rows, caption)
 
 
-def _rows(
-    sweep: xr.Dataset, case_file: CaseFile, call: Call | None
-) -> Iterator[tuple[str, str]]:  # fmt: skip
+def _rows(sweep: xr.Dataset, case_file: CaseFile, call: Call | None) -> Iterator[tuple[str, str]]:
     """Facts about the computation."""
     facts = sweep.attrs
     yield "case file", str(case_file.path.name)

@@ -24,8 +24,7 @@ Point = tuple[Value, ...]
 
 def grid(varied: Sequence[Varied]) -> list[Point]:
     """All combinations of values; the last key varies fastest."""
-    count = math.prod(len(one.values) for one in varied)
-    _check_count(count)
+    _check_count(math.prod(len(one.values) for one in varied))
     return list(product(*(one.values for one in varied)))
 
 

@@ -272,8 +272,7 @@ def swept(
     if device == "gpu" and isinstance(plan.compute, MotionComputation):
         chosen = SideBySide(job, plan.compute.motion)
     with chosen as pool:
-        evaluations = Evaluations[Point](pool, job.stamp, folder, follow)
-        found = evaluations.at(points, _lost, first=True)
+        found = Evaluations[Point](pool, job.stamp, folder, follow).at(points, _lost, first=True)
     _tell(plan, found)
     facts = {"wall_seconds": time.perf_counter() - follow.began, "processes": count, **about}
     return dataset(plan, found, facts)

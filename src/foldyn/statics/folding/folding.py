@@ -161,8 +161,7 @@ class Folding:
                 order = "in an unknown order, since panels cross"
             else:
                 order = "in the order in which they arrived"
-            count = len(self.closed)
-            lines.append(f"{count} creases are closed: panels lie on each other {order}")
+            lines.append(f"{len(self.closed)} creases are closed: panels lie on each other {order}")
         if self.first_crossings:
             lines.append(f"panels cross {self._where_crossed}")
         else:
@@ -281,8 +280,7 @@ def fold(
     except ways.WayInterrupted as stop:
         done = len(stop.way.shapes) - 1
         partial = _result(pattern, energy, stop.way, targets) if done else None
-        text = f"interrupted after {done} of {steps} steps"
-        raise MotionInterrupted(text, partial) from None
+        raise MotionInterrupted(f"interrupted after {done} of {steps} steps", partial) from None
     folding = _result(pattern, energy, way, targets)
     _warn(folding)
     return folding
@@ -415,11 +413,10 @@ def path_of(pattern: Pattern, energy: FoldEnergy, way: ways.Way) -> xarray.Datas
         positions.append(place)
     strain = [ways.largest_strain(shape) for shape in way.shapes]
     bend = [energy.bent(shape.turns).max(initial=0.0) for shape in way.shapes]
-    turns = [energy.creases(shape.turns) for shape in way.shapes]
     values = {
         "displacement": np.array(positions) - pattern.vertices,
         "position": positions,
-        "fold_angle": turns,
+        "fold_angle": [energy.creases(shape.turns) for shape in way.shapes],
         "strain": strain,
         "bend": bend,
     }

@@ -190,10 +190,9 @@ def _triples(
     shapely.prepare(common)
     shared = shapely.intersects(common[rows], inside[thirds])
     rows, thirds = np.array(rows, np.int64)[shared], np.array(thirds, np.int64)[shared]
-    ends = pairs[rows]
     found = [
         (k, row[b, c], row[a, c])
-        for k, (a, b), c in zip(rows.tolist(), ends.tolist(), thirds.tolist(), strict=True)
+        for k, (a, b), c in zip(rows.tolist(), pairs[rows].tolist(), thirds.tolist(), strict=True)
     ]
     return np.array(found, np.int64).reshape(-1, 3)
 

@@ -101,8 +101,7 @@ def _given(pattern: Pattern, angles: Any) -> NDArray[np.float64]:
             "crease is free), one for all, or a mapping",
             "angles",
         )
-    free = np.array([a is None for a in angles], bool)
-    return np.where(free, np.nan, np.radians(checked))
+    return np.where(np.array([a is None for a in angles], bool), np.nan, np.radians(checked))
 
 
 def _angle(field: str, value: Any) -> float:
