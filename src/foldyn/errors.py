@@ -144,8 +144,7 @@ class Faults:
 
     def add(self, error: InputError) -> None:
         """Add an error and its others."""
-        alone = type(error)(error.reason, error.field, error.file)
-        self.found += [alone, *error.others]
+        self.found += [type(error)(error.reason, error.field, error.file), *error.others]
 
     def raise_all(self) -> None:
         """Raise all errors as one, if there are any."""

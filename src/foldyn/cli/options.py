@@ -64,8 +64,7 @@ def add_reading(
     add(command, number, {"--scale": scale})
     add(command, str, {"--unit": units})
     add(command, frame_of, {"--frame": frame})
-    alike = "distance (m) within which points of the file are one"
-    add(command, number, {"--tolerance": alike})
+    add(command, number, {"--tolerance": "distance (m) within which points of the file are one"})
     flag(command, "--flat-foldable", "move vertices to the nearest places that fold flat")
 
 

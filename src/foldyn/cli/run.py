@@ -60,8 +60,7 @@ def run(given: Namespace) -> Path:
     with told.noting():  # warnings would distract from the one message on bad input
         case_file = _read(path, given)
         if getattr(given, "film", None):
-            output = replace(case_file.output, animation=given.film)
-            case_file = replace(case_file, output=output)
+            case_file = replace(case_file, output=replace(case_file.output, animation=given.film))
         changes = _device(case_file, getattr(given, "device", None))
         task = list[Computation]()
         for mass in case_file.masses:
@@ -85,8 +84,7 @@ def run(given: Namespace) -> Path:
     ):
         with noted_warnings(path if page else None) as noted:
             introduction = _introduction(case_file, told, say)
-            bar = not given.quiet and sys.stderr.isatty()
-            done = _computed(task, kept, introduction, bar, say)
+            done = _computed(task, kept, introduction, not given.quiet and sys.stderr.isatty(), say)
         call = Call(given.typed, tuple(noted), **clock.spent())
         say(f"wrote {', '.join(kept.kept)}")
         if page:

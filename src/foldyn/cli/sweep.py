@@ -55,10 +55,8 @@ def add_sweep(commands: Any) -> None:
     add(sweep, integer, {"--seed": "of the samples (default: 0)"})
     ties = {"--tie KEY=EXPRESSION": "a key that depends on others, such as b=360 - a"}
     add(sweep, str, ties, action="append")
-    count = "points at a time (default: one per processor)"
-    add(sweep, integer, {"--processes N": count})
-    workers = "Dask scheduler whose workers compute instead"
-    add(sweep, str, {"--scheduler ADDRESS": workers})
+    add(sweep, integer, {"--processes N": "points at a time (default: one per processor)"})
+    add(sweep, str, {"--scheduler ADDRESS": "Dask scheduler whose workers compute instead"})
     add(sweep, str, {
         "--device": "where motions are computed (default: as the file says, else auto: on a GPU "
         "where that pays)",
@@ -100,8 +98,7 @@ def run_sweep(given: argparse.Namespace) -> Path:
                 f"all {found.attrs['points']} points failed, the first with: "
                 f"{found['failure'].values.flat[0]}"
             )
-        page = partial(write_sweep, found, folder, plan.case_file)
-        add_page(given, folder, noted, spent, page)
+        add_page(given, folder, noted, spent, partial(write_sweep, found, folder, plan.case_file))
     return folder
 
 
@@ -172,8 +169,7 @@ def _swept(
                 failed = f", {course.failed} failed" if course.failed else ""
                 say(f"  {course.done} of {total} points{failed}, {_left(course.left)}")
 
-        folder = results.folder / KEPT
-        return swept(plan, given.processes, given.scheduler, folder, tell)
+        return swept(plan, given.processes, given.scheduler, results.folder / KEPT, tell)
 
 
 def _left(seconds: float) -> str:

@@ -87,8 +87,7 @@ def _stages(
     if case_file.analysis.kind not in SHOWN:
         return
     results = {name: plan.evaluator.result(designs[name]) for name in cases}
-    nodes = case_file.output.nodes.tolist()
-    yield stage(results, cases, f"{case_file.heading}: a design", nodes)
+    yield stage(results, cases, f"{case_file.heading}: a design", case_file.output.nodes.tolist())
 
 
 def _verdict(found: Design, plan: Plan) -> str:

@@ -154,5 +154,4 @@ def sheet(panels: Panels) -> tuple[Panels, NDArray, list[tuple[float, NDArray]]]
         if k != largest
     ]
     faces = tuple(face for face, k in zip(panels.faces, part, strict=True) if k == largest)
-    kept = Panels(panels.points, faces, panels.letters, panels.angles)
-    return kept, total[~outer], others
+    return Panels(panels.points, faces, panels.letters, panels.angles), total[~outer], others

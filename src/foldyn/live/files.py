@@ -94,8 +94,7 @@ def _results(paths: Sequence[Path]) -> View:
 
 def _pattern(path: Path) -> View:
     """Stage of a pattern folding to its fold angles, or at rest if it has none or does not fold."""
-    pattern = read_pattern(path)
-    return View(path.stem, folded_stage(pattern, path.stem))
+    return View(path.stem, folded_stage(read_pattern(path), path.stem))
 
 
 def folded_stage(pattern: Pattern, title: str) -> Stage:

@@ -281,8 +281,7 @@ class _Conditions:
             corners += [(len(corners), *corner) for corner in found if corner and None not in found]
         self.panel, *self.turns = np.array(corners, np.int64).reshape(-1, 5).T
         _, self.panel = np.unique(self.panel, return_inverse=True)
-        around_panels = self.at(drawn)[0][len(vertices) :]
-        kept = np.abs(around_panels)[self.panel] < NEARLY_PLANE
+        kept = np.abs(self.at(drawn)[0][len(vertices) :])[self.panel] < NEARLY_PLANE
         _, self.panel = np.unique(self.panel[kept], return_inverse=True)
         self.turns = [column[kept] for column in self.turns]
 

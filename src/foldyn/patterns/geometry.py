@@ -85,8 +85,7 @@ def face_geometry(vertices: NDArray, faces: Faces) -> FaceGeometry:
             distance = np.linalg.norm(np.roll(corners, -shift, axis=1) - corners, axis=2)
             diameter[which] = np.maximum(diameter[which], distance.max(axis=1))
             shortest[which] = np.minimum(shortest[which], distance.min(axis=1))
-        height = np.einsum("fvc,fc->fv", corners, normals[which])
-        planarity[which] = np.abs(height).max(axis=1)
+        planarity[which] = np.abs(np.einsum("fvc,fc->fv", corners, normals[which])).max(axis=1)
         crossed[which] = _crosses_itself(corners, normals[which], diameter[which])
     for bad, text, sizes in (
         (
@@ -189,8 +188,7 @@ def seams(
     near : float
         Distance within which points coincide, relative to the size of the pattern.
     """
-    place = _places(vertices, boundary, near)
-    ends = np.sort(place[boundary], axis=1)
+    ends = np.sort(_places(vertices, boundary, near)[boundary], axis=1)
     _, group, count = np.unique(ends, axis=0, return_inverse=True, return_counts=True)
     doubled = np.flatnonzero(count[group.ravel()] > 1)
     if not len(doubled):

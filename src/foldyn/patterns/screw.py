@@ -122,8 +122,7 @@ def of_twist(twist: NDArray) -> Screw:
     if angle < STILL:
         return translation(move)
     axis = turn / angle
-    point = np.cross(turn, move) / angle**2
-    return _screw(axis, angle, float(move @ axis), point)
+    return _screw(axis, angle, float(move @ axis), np.cross(turn, move) / angle**2)
 
 
 def _screw(axis: NDArray, angle: float, shift: float, point: NDArray) -> Screw:

@@ -105,8 +105,7 @@ def thicken(
                 )
             vertices[vertex], placed[vertex] = place, True
     starts = np.concatenate([[0], np.cumsum([len(face) for face in pattern.faces])])
-    boards = Boards(starts, np.concatenate(middles), sizes)
-    return pattern.changed(vertices=vertices, boards=boards)
+    return pattern.changed(vertices=vertices, boards=Boards(starts, np.concatenate(middles), sizes))
 
 
 def _thickness(given: Any, pattern: Pattern) -> NDArray[np.float64]:

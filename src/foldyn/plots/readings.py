@@ -152,8 +152,7 @@ def displacements(result: xr.Dataset, dimension: str = "step") -> NDArray[np.flo
 
 def way(path: xr.Dataset) -> NDArray[np.float64]:
     """Mean distance (m) that the nodes have traveled up to each point; it never decreases."""
-    motion = np.diff(displacements(path), axis=0)
-    steps = np.sqrt((motion**2).sum(axis=2).mean(axis=1))
+    steps = np.sqrt((np.diff(displacements(path), axis=0) ** 2).sum(axis=2).mean(axis=1))
     return np.concatenate([[0.0], np.cumsum(steps)])
 
 
@@ -252,8 +251,7 @@ def moved_supports(case: Case) -> tuple[list[int], str] | None:
         return None
     largest, direction = farthest(motion)
     moved = motion[:, signed("direction", direction)[0]]
-    together = np.isclose(moved, largest, rtol=1e-9, atol=0.0)
-    return np.flatnonzero(together).tolist(), direction
+    return np.flatnonzero(np.isclose(moved, largest, rtol=1e-9, atol=0.0)).tolist(), direction
 
 
 def total_reaction(
@@ -282,8 +280,7 @@ def total_reaction(
     _, sign = signed("direction", direction)
     axis = direction[-1]
     chosen = path["support_node"].isin(list(nodes)) & (path["support_axis"] == axis)
-    held = path["support_node"].values[chosen.values]
-    loose = sorted(set(nodes) - set(held.tolist()))
+    loose = sorted(set(nodes) - set(path["support_node"].values[chosen.values].tolist()))
     if loose:
         raise InputError(f"nodes: no support holds node {loose[0]} along {axis}")
     return sign * path["reaction"].values[:, chosen.values].sum(axis=1) + 0.0  # avoid -0

@@ -171,6 +171,5 @@ def _pieces(stable: NDArray[np.bool_], marked: NDArray[np.bool_]) -> list[tuple[
         return [(np.array([0]), bool(stable[0]))]
     # a bifurcation is neither stable nor unstable: the other end of the segment decides
     segment = np.where(marked[:-1], stable[1:], stable[:-1])
-    ends = np.flatnonzero(np.diff(segment)) + 1
-    edges = [0, *ends.tolist(), count - 1]
+    edges = [0, *(np.flatnonzero(np.diff(segment)) + 1).tolist(), count - 1]
     return [(np.arange(first, last + 1), bool(segment[first])) for first, last in pairwise(edges)]

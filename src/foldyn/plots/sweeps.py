@@ -129,8 +129,7 @@ def plot_sweep_lines(
         `sweep` is not a sweep, there is no such measure or parameter, no point has a value, or `at`
         does not name a further parameter of a grid.
     """
-    chart = sweep_charts.line_chart(sweep, measure, x, by, at)
-    return figure_of([chart], (6.2, 4.0), title)
+    return figure_of([sweep_charts.line_chart(sweep, measure, x, by, at)], (6.2, 4.0), title)
 
 
 def plot_main_effects(

@@ -313,8 +313,7 @@ def _split(ds: xr.Dataset) -> xr.Dataset:
 
 def _joined(ds: xr.Dataset) -> xr.Dataset:
     """Rejoin complex variables from their parts."""
-    names = dict.fromkeys(part.attrs.get(_WHOLE) for part in ds.data_vars.values())
-    for name in names:
+    for name in dict.fromkeys(part.attrs.get(_WHOLE) for part in ds.data_vars.values()):
         if name is None:
             continue
         real, imag = (ds[f"{name}_{part}"] for part in _PARTS)

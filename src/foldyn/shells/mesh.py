@@ -273,8 +273,7 @@ def sides(
     wings = []
     for k in stiff:
         hinge[k], weight[k] = len(numbers) + len(wings), 1.0
-        row = (a[k], b[k], third[k], n + len(wings))
-        hinges.append(np.array([row]))
+        hinges.append(np.array([(a[k], b[k], third[k], n + len(wings))]))
         wings.append(opposite(mesh.nodes[[a[k], b[k], third[k]]]))
     free = np.zeros(3 * count, bool)
     free[alone] = True

@@ -306,8 +306,7 @@ def _map(panel: CondensedPanel, conditions: Sequence[int], rise: NDArray) -> NDA
         push[k, corners + where[k]] = 1.0
         if clamped[k]:
             given[k, corners + count + where[k]] = 1.0
-    known = (what == VERTEX) | still | clamped
-    free = np.flatnonzero(~known)
+    free = np.flatnonzero(~((what == VERTEX) | still | clamped))
     right = push[free] - panel.stiffness[free] @ given
     level = np.zeros((len(rise), inputs))
     level[:, inputs - len(rise) :] = 1.0
@@ -336,8 +335,7 @@ def _moved(rest: NDArray, x: NDArray, kind: _Kind) -> tuple[NDArray, NDArray]:
     before, after = (place[nodes] - place[kind.nodes].mean(axis=1)[:, None] for place in (rest, x))
     both = np.einsum("pki,pkj->pij", before[:, :corners], after[:, :corners])
     left, _, right = np.linalg.svd(both)
-    sign = np.sign(np.linalg.det(left @ right))
-    left[:, :, 2] *= sign[:, None]
+    left[:, :, 2] *= np.sign(np.linalg.det(left @ right))[:, None]
     rotation = np.swapaxes(left @ right, 1, 2)  # from rest to now
     local = np.einsum("pki,pij->pkj", after, rotation) - before
     local = np.einsum("pad,pkd->pka", kind.frames, local)
@@ -345,8 +343,7 @@ def _moved(rest: NDArray, x: NDArray, kind: _Kind) -> tuple[NDArray, NDArray]:
     angle = Rotation.from_matrix(rotation).as_rotvec()
     along = np.roll(before[:, :corners], -1, axis=1) - before[:, :corners]
     along /= np.linalg.norm(along, axis=2)[:, :, None]
-    turned = -np.einsum("pi,pki->pk", angle, along)
-    return local, turned
+    return local, -np.einsum("pi,pki->pk", angle, along)
 
 
 def _stretched(rest: NDArray, after: NDArray, corners: int) -> NDArray[np.float64]:

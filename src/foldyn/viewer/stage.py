@@ -182,8 +182,7 @@ def _folding(one: _Shown) -> Iterator[dict[str, Any]]:
     result, u = one.result, displacements(one.result, "step")
     own_fields = folding_fields(one.case, u, result["fold_angle"].values)
     about = _changing(one, result, u, way(result), own_fields)
-    load = one.arrays.exact(f"{one.key}.load", result["share"].values, "f4")
-    yield about | {"load": load}
+    yield about | {"load": one.arrays.exact(f"{one.key}.load", result["share"].values, "f4")}
 
 
 def _changing(
@@ -237,10 +236,9 @@ def _modes(one: _Shown) -> Iterator[dict[str, Any]]:
 def _response(one: _Shown) -> Iterator[dict[str, Any]]:
     values = one.result[quantity_of(one.result)].transpose("frequency", "node", "axis").values
     both = np.stack([np.real(values), np.imag(values)], axis=1)
-    frequency = one.result["frequency"].values
     yield {
         "displacement": one.arrays.changing(f"{one.key}.u", both, OF_LARGEST / 1000),
-        "moments": one.arrays.exact(f"{one.key}.t", frequency, "f4"),
+        "moments": one.arrays.exact(f"{one.key}.t", one.result["frequency"].values, "f4"),
     }
 
 

@@ -129,8 +129,7 @@ def _provenance(fit: Fit, runs: Sequence[_Run], call: Call) -> list[Section]:
         sections.append(
             inputs_table(inputs(run.case_file, case, {run.case_file.masses[0]: run.result}))
         )
-    results = {run.name: run.result for run in runs}
-    sections.append(inputs_table(computed(results, call)))
+    sections.append(inputs_table(computed({run.name: run.result for run in runs}, call)))
     for path in dict.fromkeys([fit.problem.path, *(run.case_file.path for run in runs)]):
         sections.append(Listing(f"The case file {path.name}", path.read_text("utf-8")))
     return sections

@@ -157,8 +157,7 @@ class Uncertainty:
         seen = own & (singular > WEAK * singular[0])
         with np.errstate(divide="ignore", invalid="ignore"):
             seen &= ~(misfit / singular > 1.0)
-        weak = np.sqrt((rows[own & ~seen] ** 2).sum(axis=0))
-        determined = weak < PART
+        determined = np.sqrt((rows[own & ~seen] ** 2).sum(axis=0)) < PART
         inverse = rows[seen].T / singular[seen] ** 2 @ rows[seen]
         cov = inverse * misfit**2
         influence = -scale[:, None] * (inverse @ jacobian.T)

@@ -84,12 +84,11 @@ class SyntheticFilm:
         seen = np.zeros((len(self.time), count), dtype=bool)
         for k, one in self._seen.items():
             seen[k] = one
-        dropped = np.isin(np.arange(len(self.time)), self.dropped)
         data = {
             "position": (("time", "node", "axis"), positions, {"units": "m"}),
             "position_px": (("time", "node", "uv"), self.studio.camera.project(positions)),
             "seen": (("time", "node"), seen),
-            "dropped": (("time",), dropped),
+            "dropped": (("time",), np.isin(np.arange(len(self.time)), self.dropped)),
         }
         time = ("time", self.time, {"units": "s"})
         names = {"node": np.arange(count), "axis": ["x", "y", "z"], "uv": ["u", "v"]}

@@ -123,8 +123,7 @@ def _first_of_each(points: NDArray[np.float64], apart: float) -> NDArray[np.bool
     """Points that have no earlier point within a distance."""
     kept = np.zeros(len(points), dtype=bool)
     for k, point in enumerate(points):
-        distance = np.hypot(*(points[kept] - point).T)
-        kept[k] = not (distance < apart).any()
+        kept[k] = not (np.hypot(*(points[kept] - point).T) < apart).any()
     return kept
 
 
@@ -295,8 +294,7 @@ def _intersection(lines: Any) -> tuple[float, float, float, int]:
         misfit = np.sum(weight * left**2) / max(count - 2, 1)
         error = np.sqrt(max(misfit, 1.0) * (1.0 / (half - turn) + 1.0 / (half + turn)))
         worst = int(np.argmax(np.sqrt(weight) * np.abs(left)))
-        allowed = max(4.0 * max(lines[worst, 3], 0.02), 0.15)
-        if count < 3 or np.abs(left[worst]) < allowed:
+        if count < 3 or np.abs(left[worst]) < max(4.0 * max(lines[worst, 3], 0.02), 0.15):
             break
         weight[worst] = 0.0
     return x, y, error, count

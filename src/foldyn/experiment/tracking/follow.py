@@ -328,8 +328,7 @@ def _flow(last, frame, start, guess, led, reach, settings: FollowSettings):
 
 def _within(points, shape, margin):
     height, width = shape
-    inside = (points >= margin) & (points <= np.array([width, height]) - 1.0 - margin)
-    return inside.all(axis=1)
+    return ((points >= margin) & (points <= np.array([width, height]) - 1.0 - margin)).all(axis=1)
 
 
 def _by_neighbors(state: _State, place: Array, good: NDArray[np.bool_]) -> tuple[Array, Array]:

@@ -308,8 +308,7 @@ def _vibrations(front: xr.Dataset, data: Data) -> list[Section]:
         digits=3,
     )
     held, alone = (found[f"model: {SUPPORT_NAMES[key]}"].peak for key in (FILM_SUPPORT, ALONE))
-    glue = Text(_glue(held, alone, paper["release_frequency"].value))
-    return [table, *_tracked(front), glue]
+    return [table, *_tracked(front), Text(_glue(held, alone, paper["release_frequency"].value))]
 
 
 def _tracked(front: xr.Dataset) -> list[Section]:
