@@ -30,9 +30,8 @@ def shortened(message: str) -> str:
         kept.append(line if len(line) <= LONGEST_LINE else f"{line[:start]} ... {line[-end:]}")
         if sum(map(len, kept)) > LONGEST - LONGEST_LINE:
             break
-    left = len(lines) - len(kept)
-    if left:
-        kept[-1] = f"  ... and {left + 1} lines more"
+    if len(lines) > len(kept):
+        kept[-1] = f"  ... and {len(lines) - len(kept) + 1} lines more"
     return "\n".join(kept)
 
 

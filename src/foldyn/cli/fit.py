@@ -36,9 +36,8 @@ def add_fit(commands: Any) -> None:
         "values found, figures and report.html go to a folder; so does every evaluation of the "
         "model, so that an interrupted fit can be resumed.",
     )
-    named = "fit file, or case file (TOML) or the name of a shipped case"
     data = "with a case file: measurements (CSV, tracks of a film, or a result of kind modes)"
-    add(fit, str, {"file": named})
+    add(fit, str, {"file": "fit file, or case file (TOML) or the name of a shipped case"})
     add(fit, str, {"data": data}, nargs="*")
     many: dict[str, Any] = {"action": "append", "default": []}
     add(fit, str, {

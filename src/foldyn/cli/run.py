@@ -186,14 +186,13 @@ def _computed(
             with told.noting() if len(task) > 1 else nullcontext():
                 done[one.mass] = one.run(progress, introduction)
         except (ComputationError, MotionInterrupted) as error:
-            failed = type(error)(f"{one.place}{error}", error.partial)
             if error.partial is not None:
                 error.partial.attrs.setdefault("stopped_because", str(error))
                 results.keep(one.file, partial(save, error.partial))
                 if not isinstance(error, MotionInterrupted):
                     _saved(one, error.partial)
             told.issue()
-            raise failed from None
+            raise type(error)(f"{one.place}{error}", error.partial) from None
         result = done[one.mass]
         there = result.encoding.get("source") == str(results.folder / one.file)
         results.keep(one.file, partial(save, result) if not there else lambda _: None)

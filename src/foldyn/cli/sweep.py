@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 import time
+from collections import Counter
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
@@ -13,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from foldyn.cli.folder import Results, add_page, held_by
 from foldyn.cli.options import add, add_figures, add_results, halves, integer
 from foldyn.cli.streams import Clock, noted_warnings, progress_bar, speech
-from foldyn.errors import ComputationError, InputError
+from foldyn.errors import ComputationError, InputError, within
 
 if TYPE_CHECKING:
     import xarray
@@ -114,12 +115,8 @@ def _plan(path: Path, given: argparse.Namespace) -> Plan:
         here = Path.cwd()
         if str(here) not in sys.path:
             sys.path.insert(0, str(here))  # as with `python -m`: for the user's modules
-        measures = []
-        for text in given.measure:
-            try:
-                measures.append(own_measure(text, here) or text)
-            except InputError as error:
-                raise InputError(f"--measure{error}") from None
+        with within("--measure"):
+            measures = [own_measure(text, here) or text for text in given.measure]
     asked = given.samples, given.method, given.seed, ties, given.device
     return plan_of(path, vary, measures, *asked)
 
@@ -189,9 +186,7 @@ def _tell_failed(found: xarray.Dataset, say: Callable[[str], None]) -> None:
     if not failed:
         return
     say(f"values are missing at {failed} of {found.attrs['points']} points:")
-    reasons: dict[str, int] = {}
-    for reason in filter(None, found["failure"].values.ravel().tolist()):
-        reasons[reason] = reasons.get(reason, 0) + 1
+    reasons = Counter(filter(None, found["failure"].values.ravel().tolist()))
     for reason, count in list(reasons.items())[:MOST_NAMED]:
         say(f"  {count} of them: {reason}")
     if len(reasons) > MOST_NAMED:

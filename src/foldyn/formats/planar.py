@@ -149,10 +149,8 @@ def _with_crossings(lines: Lines, near_by: float, tolerance: float) -> tuple[Lin
         raise too_many(f"{len(pairs)} crossings")
     every = np.concatenate((points, places))
     number = merged(every, tolerance, kept=len(points))[len(points) :]
-    more = replace(lines, points=every)
-    hits = np.concatenate((np.column_stack((pairs[:, 0], number)),
-                           np.column_stack((pairs[:, 1], number))))  # fmt: skip
-    return more, hits[(ends[hits[:, 0]] != hits[:, 1:]).all(axis=1)]
+    hits = np.column_stack((pairs.T.ravel(), np.tile(number, 2)))
+    return replace(lines, points=every), hits[(ends[hits[:, 0]] != hits[:, 1:]).all(axis=1)]
 
 
 def _crossings(

@@ -70,9 +70,8 @@ class FlatFoldability:
         """Whether mountains minus valleys are 2 or -2 (k,), or can be once all have letters."""
         least = self.mountains - self.valleys - self.unassigned
         most = self.mountains - self.valleys + self.unassigned
-        even = self.degrees % 2 == 0
         reached = ((least <= 2) & (most >= 2)) | ((least <= -2) & (most >= -2))
-        return (self.degrees == 0) | (even & reached)
+        return (self.degrees == 0) | ((self.degrees % 2 == 0) & reached)
 
     def kawasaki(self, tolerance: float) -> NDArray[np.bool_]:
         """Whether the alternating sum is zero within a tolerance (rad) (k,)."""

@@ -111,7 +111,6 @@ def face_geometry(vertices: NDArray, faces: Faces) -> FaceGeometry:
 
 def _crosses_itself(corners: NDArray, normals: NDArray, diameter: NDArray) -> NDArray:
     """Whether two edges of a face, seen along its normal, cross (touching does not count)."""
-    size = corners.shape[1]
     after = np.roll(corners, -1, axis=1)
     least = _DEGENERATE * diameter[:, None] ** 2
     result = np.zeros(len(corners), dtype=bool)
@@ -120,7 +119,7 @@ def _crosses_itself(corners: NDArray, normals: NDArray, diameter: NDArray) -> ND
         turn = np.einsum("fvc,fc->fv", np.cross(b - a, c - a), normals)
         return np.where(np.abs(turn) > least, np.sign(turn), 0).astype(np.int8)
 
-    for shift in range(2, size // 2 + 1):
+    for shift in range(2, corners.shape[1] // 2 + 1):
         other, other_after = np.roll(corners, -shift, axis=1), np.roll(after, -shift, axis=1)
         parted = side(corners, after, other) * side(corners, after, other_after) < 0
         parts = side(other, other_after, corners) * side(other, other_after, after) < 0

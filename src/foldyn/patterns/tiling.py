@@ -68,9 +68,8 @@ def glue(vertices: Sequence[NDArray], edges: Sequence[NDArray], tolerance: float
     rim = np.concatenate([part + start for part, start in zip(edges, starts, strict=False)])
     owner = np.repeat(np.arange(len(edges)), [len(part) for part in edges])
     ends = points[rim].reshape(-1, 6)
-    turned = points[rim[:, ::-1]].reshape(-1, 6)
     tree, same, joined = cKDTree(ends), [], 0
-    for other, flip in ((turned, True), (ends, False)):
+    for other, flip in ((points[rim[:, ::-1]].reshape(-1, 6), True), (ends, False)):
         for e, matches in enumerate(tree.query_ball_tree(cKDTree(other), tolerance * np.sqrt(2.0))):
             for f in matches:
                 if owner[e] < owner[f]:

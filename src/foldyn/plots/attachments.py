@@ -147,13 +147,13 @@ def _hatched(sheet: Sheet3D, points: Points, edges: Any, size: float) -> Points:
     return np.array(lines).reshape(-1, 2, 3)
 
 
-def direction_triangles(case: Case, kind: type, points: Points, size: float, sight: View) -> Points:
+def direction_triangles(
+    case: Case, kind: type[Fix | Impose], points: Points, size: float, sight: View
+) -> Points:
     """Triangles (k, 3, 3) at nodes held along directions by one kind, `Fix` or `Impose`."""
     middle, found = points.mean(axis=0), []
     for support in case.supports:
-        if not isinstance(support, Fix | Impose) or type(support) is not kind:
-            continue
-        if support.direction is None:
+        if not isinstance(support, kind) or support.direction is None:
             continue
         nodes, unit = resolve_nodes(case.structure, support.nodes), unit_vector(support.direction)
         values = np.broadcast_to(getattr(support, "value", 0.0), (len(nodes),))

@@ -18,6 +18,7 @@ from foldyn.errors import InputError
 from foldyn.linear.frf import PER_FORCE, quantity_of
 from foldyn.mechanics.contact.term import GROUP as CONTACT
 from foldyn.mechanics.springs import GROUP
+from foldyn.patterns.palette import BLUE, GRAY, GREEN, PURPLE, SKY, VERMILLION
 from foldyn.results.contents import nodes_of
 from foldyn.results.quantities import RESPONSES
 from foldyn.structures import Structure
@@ -224,16 +225,16 @@ def asked(
     return numbers, main_direction(paths, numbers) if direction is None else direction
 
 
-# Names of strain energies in stacking order from the bottom up: folds are on top.
-STRAIN: Mapping[str, str] = {
-    "strain_bars": "bars",
-    "strain_membrane": "membrane",
-    "strain_panels": "panels",
-    "strain_bends": "bends",
-    "strain_bending": "bending",
-    "strain_folds": "folds",
-    GROUP: "springs",
-    CONTACT: "contact",
+# Names and colors of strain energies in stacking order from the bottom up: folds are on top.
+STRAIN: Mapping[str, tuple[str, str]] = {
+    "strain_bars": ("bars", VERMILLION),
+    "strain_membrane": ("membrane", VERMILLION),
+    "strain_panels": ("panels", VERMILLION),
+    "strain_bends": ("bends", PURPLE),
+    "strain_bending": ("bending", PURPLE),
+    "strain_folds": ("folds", GREEN),
+    GROUP: ("springs", SKY),
+    CONTACT: ("contact", BLUE),
 }
 MOST_MODES = 12
 # Variables of modes that figures need.
@@ -316,7 +317,13 @@ def parts_of(result: xr.Dataset) -> tuple[str, ...]:
 
 def strain_name(part: str) -> str:
     """Name of a strain energy in words."""
-    return STRAIN.get(part, part.removeprefix("strain_").replace("_", " "))
+    own = part.removeprefix("strain_").replace("_", " ")
+    return STRAIN.get(part, (own, ""))[0]
+
+
+def strain_color(part: str) -> str:
+    """Color of a part of the strain energy."""
+    return STRAIN.get(part, ("", GRAY))[1]
 
 
 def stacked(path: xr.Dataset) -> dict[str, NDArray[np.float64]]:

@@ -67,14 +67,12 @@ def plot_response_curve(
             keys.append(style.key(name, color=color))
     if not all(curve["stable"].values.all() for curve in labeled.values()):
         keys.append(style.key("unstable", color=style.GRAY, linestyle=UNSTABLE))
-    for name in (name for name in MARKERS if name in kept):
-        keys.append(style.key(name, **_mark(style.GRAY, name)))
+    keys += [style.key(name, **_mark(style.GRAY, name)) for name in MARKERS if name in kept]
     if backbone is not None and along == "frequency":
         _kind("backbone", backbone, "backbone", "mode")
-        size = _size_along(backbone, labeled)
         look = {"color": style.GRAY, "linewidth": 1.0, "label": "backbone", "zorder": 1.0}
         limits = axes.get_xlim(), axes.get_ylim()
-        keys += axes.plot(backbone["frequency"].values, size, **look)
+        keys += axes.plot(backbone["frequency"].values, _size_along(backbone, labeled), **look)
         axes.set(xlim=limits[0], ylim=limits[1])
     style.exponents(axes)
     return style.finish(figure, keys, 4, width=SIZE[0])

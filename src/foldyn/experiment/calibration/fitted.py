@@ -163,9 +163,8 @@ class Uncertainty:
         influence = -scale[:, None] * (inverse @ jacobian.T)
         error = np.where(determined, np.sqrt(np.diag(cov)) * scale, np.inf)
         error[at_bound] = np.nan
-        usable = determined & ~at_bound
         correlation = np.full((p, p), np.nan)
-        some = np.flatnonzero(usable)
+        some = np.flatnonzero(determined & ~at_bound)
         root = np.sqrt(np.diag(cov))[some]
         with np.errstate(divide="ignore", invalid="ignore"):
             correlation[np.ix_(some, some)] = cov[np.ix_(some, some)] / np.outer(root, root)

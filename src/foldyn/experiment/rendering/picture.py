@@ -273,9 +273,8 @@ def _unhidden(
     """Nodes in the image that no panel hides by more than a hundredth of the distance."""
     height, width = depth.shape
     at = np.rint(pixels).astype(np.int64)
-    inside = ((at >= 1) & (at < [width - 1, height - 1])).all(axis=1)
     seen = np.zeros(len(at), dtype=bool)
-    for node in np.flatnonzero(inside):
+    for node in np.flatnonzero(((at >= 1) & (at < [width - 1, height - 1])).all(axis=1)):
         u, v = at[node]
         around = depth[v - 1 : v + 2, u - 1 : u + 2]
         # some of the nine pixels around a node show one of its own panels, not one in front

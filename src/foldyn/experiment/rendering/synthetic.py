@@ -90,9 +90,8 @@ class SyntheticFilm:
             "seen": (("time", "node"), seen),
             "dropped": (("time",), np.isin(np.arange(len(self.time)), self.dropped)),
         }
-        time = ("time", self.time, {"units": "s"})
         names = {"node": np.arange(count), "axis": ["x", "y", "z"], "uv": ["u", "v"]}
-        return xr.Dataset(data, {"time": time, **names})
+        return xr.Dataset(data, {"time": ("time", self.time, {"units": "s"}), **names})
 
 
 def film_of(
@@ -182,10 +181,9 @@ def photos_of(
     truth : xarray.Dataset
         `position`, `position_px` and `seen` along the dimension `photo`.
     """
-    structure = case_of(path).structure
     states = path["rest_position"].values + path["displacement"].values[list(steps)]
     sensor = replace(sensor or Sensor(), exposure=0.0)
-    studio = Studio.of(structure, camera, look or Look(), sensor, seed)
+    studio = Studio.of(case_of(path).structure, camera, look or Look(), sensor, seed)
 
     def positions(times: NDArray[np.float64]) -> NDArray[np.float64]:
         return states[np.rint(times).astype(int)]

@@ -97,11 +97,10 @@ def find_corners(
     settings = settings or CornerSettings()
     reach = settings.reach_in(image.shape)
     spacing = settings.spacing or 1.5 * reach
-    block = int(np.clip(round(0.3 * reach), 3, 9)) | 1
     smooth = cv2.GaussianBlur(image, (0, 0), max(0.8, 0.06 * reach))
     candidates = cv2.goodFeaturesToTrack(
         smooth, _CANDIDATES * settings.most, settings.quality, 0.2 * reach,
-        blockSize=block, useHarrisDetector=True, k=0.05,
+        blockSize=int(np.clip(round(0.3 * reach), 3, 9)) | 1, useHarrisDetector=True, k=0.05,
     )  # fmt: skip
     if candidates is None or not len(candidates):
         raise InputError(f"{place}: no corners found; take a sharp, well lit one, or another --roi")
@@ -184,10 +183,8 @@ def _refine_all(image: Any, start: Any, reach: float, moved: float, found: Any) 
             width = max(2.0, (0.32 if turn == 0 else 0.2) * reach)
             du, dv, error, count = _meet(image, u, v, inner, reach, width)
             u, v = u + du, v + dv
-            if count < 2 or np.hypot(u - start[p, 0], v - start[p, 1]) > moved:
-                count = 0
-                break
-            if not _inside(image, u, v, reach):
+            strayed = np.hypot(u - start[p, 0], v - start[p, 1]) > moved
+            if count < 2 or strayed or not _inside(image, u, v, reach):
                 count = 0
                 break
         if count >= 2:

@@ -106,9 +106,8 @@ class View:
     def project(self, points: ArrayLike) -> Array:
         """Pixels (..., 2) at which points (..., 3) in m are seen."""
         seen = (np.asarray(points, dtype=np.float64) - self.origin) @ self.rotation.T
-        shrink = 1.0 + seen[..., 2:] / self.distance
         flat = (self.center - self.axis) + seen[..., :2] / self.metres_per_pixel
-        return self.axis + flat / shrink
+        return self.axis + flat / (1.0 + seen[..., 2:] / self.distance)
 
     def depth(self, points: ArrayLike) -> Array:
         """Distance of points (..., 3) behind the plane of the scale (m)."""

@@ -32,11 +32,7 @@ RELAXING: Mapping[str, Any] = {
     }
 }
 # changes to the model, which has circumcenter masses and elastic creases
-OTHERWISE: Mapping[str, Any] = {
-    **SOFTER,
-    **RELAXING,
-    "model.mass": "consistent",
-}
+OTHERWISE: Mapping[str, Any] = {**SOFTER, **RELAXING, "model.mass": "consistent"}
 SUPPORT = "glued"
 TRACKED = "film.mkv"
 
