@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from functools import partial
 from html import escape
 from pathlib import Path
@@ -103,9 +104,6 @@ def folded_stage(pattern: Pattern, title: str) -> Stage:
     given = np.isfinite(wanted)
     moves = given.any() and float(np.abs(wanted - fold_angles(pattern))[given].max()) > 1e-6
     if moves and len(pattern.faces) <= MOST_FOLDED:
-        try:
-            with quietly():  # `foldyn fold` reports failures to fold
-                return results_stage({title: fold(pattern).path}, title)
-        except FoldynError:
-            pass
+        with suppress(FoldynError), quietly():  # `foldyn fold` reports failures to fold
+            return results_stage({title: fold(pattern).path}, title)
     return rest_stage(pattern, title)

@@ -250,13 +250,6 @@ _LISTED: Mapping[str, Callable[[_Shown], Iterable[dict[str, Any]]]] = {
 """Function for each kind of result that describes it once, or once for each mode."""
 
 
-def _moved(kind: str, result: xr.Dataset) -> str:
-    """Name of the variable that describes how nodes move."""
-    if kind == "response":
-        return quantity_of(result)
-    return "coefficient" if kind == "periodic" else "displacement"
-
-
 def _more(
     kind: str, results: Results, cases: Mapping[str, Case], nodes: list[int]
 ) -> dict[str, Any]:
@@ -267,7 +260,8 @@ def _more(
         structure = next(iter(cases.values())).structure
         return about_waves(next(iter(results.values())), len(structure.triangles))
     first = next(iter(results.values()))
-    name = _moved(kind, first)
+    usual = "coefficient" if kind == "periodic" else "displacement"
+    name = quantity_of(first) if kind == "response" else usual
     moved = [
         np.abs(result[name].sel(node=nodes[:1] or [0]).transpose(..., "axis").values)
         for result in results.values()

@@ -22,7 +22,7 @@ from foldyn.errors import InputError
 from foldyn.experiment.calibration.fit_problem import Problem
 from foldyn.experiment.calibration.measurement import Measurement, spread
 from foldyn.results import netcdf
-from foldyn.writing import plain, write_json, write_text
+from foldyn.writing import plain, target_of, write_json, write_text
 
 # Singular value, relative to the largest, below which a direction is not determined at all.
 WEAK = 1e-5
@@ -410,9 +410,7 @@ class Fit:
         InputError
             The file's name has another ending, or its folder does not exist.
         """
-        path = Path(path)
-        if not path.parent.is_dir():
-            raise InputError(f"{path}: the folder {path.parent} does not exist; make it first")
+        path = target_of(path)
         if path.suffix == ".json":
             write_json(self.summary(), path)
         elif path.suffix == ".nc":
