@@ -20,9 +20,8 @@ from foldyn.arguments import Check, Checked
 from foldyn.errors import InputError, UnitsWarning
 from foldyn.values import number, show, vector
 
-SPREAD = (
-    1e-6  # least extent of points across a line, relative to their size, to determine a rotation
-)
+SPREAD = 1e-6
+"""Least extent of points across a line, relative to their size, to determine a rotation."""
 STILL = 1e-9  # rad: a smaller rotation counts as zero
 
 

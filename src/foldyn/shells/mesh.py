@@ -255,9 +255,8 @@ def sides(
         creased, joined = _with_junctions(
             creased, joined, mesh, pattern, order[np.repeat(times > 2, times)], ends
         )
-    hinges = [
-        np.column_stack([part.axis, third[part.sides]]) for part in (creased, joined)
-    ]  # pieces of creases come first
+    # pieces of creases come first
+    hinges = [np.column_stack([part.axis, third[part.sides]]) for part in (creased, joined)]
     hinge, rotation = np.full((2, 3 * count), -1)
     weight, sign = np.zeros((2, 3 * count))
     numbers = np.arange(len(creased.sides) + len(joined.sides))

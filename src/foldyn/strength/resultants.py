@@ -240,9 +240,7 @@ class PlateResultants:
         structure, pattern = self._structure, self._pattern
         rigid = set(rigid_panels(structure.options.rigid, len(pattern.faces)))
         straight = straight_creases(structure.nodes, structure.folds, pattern, structure.sheet)
-        condition = {}
-        for edge, k in edge_lookup(pattern.creases).items():
-            condition[edge] = CREASED if straight[k] else FREE
+        condition = {e: CREASED for e, k in edge_lookup(pattern.creases).items() if straight[k]}
         condition |= dict.fromkeys(structure.options.straight, STRAIGHT)
         condition |= {(low, high): CREASED for low, high, _ in structure.options.guided}
         condition |= dict.fromkeys(structure.options.clamped, CLAMPED)
