@@ -30,9 +30,8 @@ def shortened(message: str) -> str:
         kept.append(line if len(line) <= LONGEST_LINE else f"{line[:start]} ... {line[-end:]}")
         if sum(map(len, kept)) > LONGEST - LONGEST_LINE:
             break
-    left = len(lines) - len(kept)
-    if left:
-        kept[-1] = f"  ... and {left + 1} lines more"
+    if len(lines) > len(kept):
+        kept[-1] = f"  ... and {len(lines) - len(kept) + 1} lines more"
     return "\n".join(kept)
 
 
@@ -144,8 +143,7 @@ class Faults:
 
     def add(self, error: InputError) -> None:
         """Add an error and its others."""
-        alone = type(error)(error.reason, error.field, error.file)
-        self.found += [alone, *error.others]
+        self.found += [type(error)(error.reason, error.field, error.file), *error.others]
 
     def raise_all(self) -> None:
         """Raise all errors as one, if there are any."""

@@ -101,5 +101,4 @@ def name_of(inputs: Any) -> str:
 
 def warn_of_damage(file: Path, then: str = "it is computed again") -> None:
     """Warn that a file cannot be used, and what happens instead."""
-    text = f"{file}: is damaged, missing, or of another kind; {then}"
-    warn(text, "results.md#damaged-files")
+    warn(f"{file}: is damaged, missing, or of another kind; {then}", "results.md#damaged-files")

@@ -20,9 +20,7 @@ FEW = 2000  # up to this number of rows of a full matrix, more threads are slowe
 
 def processors() -> int:
     """Processors that this process may use."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def in_threads(do: Callable[[Item], Result], items: Iterable[Item]) -> list[Result]:

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from foldyn.errors import InputError
+from foldyn.input_files import path_of
 
 _LEFT = re.compile(r"\..+\.(\d+)\.tmp(\.\w+)?")
 
@@ -35,6 +36,14 @@ def whole(path: str | os.PathLike[str]) -> Iterator[Path]:
     finally:
         with suppress(OSError):
             part.unlink(missing_ok=True)
+
+
+def target_of(path: Any) -> Path:
+    """Path of a file to be written; refuse one in a folder that does not exist."""
+    path = path_of(path)
+    if not path.parent.is_dir():
+        raise InputError(f"{path}: the folder {path.parent} does not exist; make it first")
+    return path
 
 
 def write_bytes(content: bytes, path: str | os.PathLike[str]) -> None:

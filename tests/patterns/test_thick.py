@@ -149,12 +149,12 @@ TOUCH = fd.Pattern(
         (lambda: fd.thicken(SKEW, T), "pattern: hinge lines of panel 1 do not lie in one plane"),
         (lambda: fd.thicken(TOUCH, T), "would part at vertex 2, where they meet in a corner alone"),
         (lambda: fd.thicken(strip(2), 0.0), "thickness = 0.0: must be greater than 0"),
-        (lambda: fd.thicken(strip(2), [1, 2, 3]), "thickness: 3 values for 2 panels"),
+        (lambda: fd.thicken(strip(2), [1, 2, 3]), "3 values for 2 panels; give one, or"),
         (
             lambda: fd.thicken(strip(2), T, offsets=0.06),
             "offsets: crease 0 has 0.06 m: must be at most h",
         ),
-        (lambda: fd.thicken(strip(2), T, offsets=[0, 0]), "offsets: 2 values for 1 creases"),
+        (lambda: fd.thicken(strip(2), T, offsets=[0, 0]), "2 values for 1 creases; give one, or"),
         (
             lambda: fd.thicken(fd.Pattern(strip(2).vertices, strip(2).faces, "U"), T),
             "offsets: crease 0 is unassigned",

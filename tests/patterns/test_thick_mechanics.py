@@ -197,7 +197,7 @@ def test_from_a_case_file_to_a_result_and_back(tmp_path, kind, model):
     ("offset", "message"),
     [
         ('"face"', r'pattern.hinge_offset = "face": give "faces", or heights \(m\)'),
-        ("[0.02]", "pattern.hinge_offset: 1 values for 2 creases"),
+        ("[0.02]", r"pattern.hinge_offset = \[0.02\]: 1 value for 2 creases"),
         ("0.03", "pattern.hinge_offset: crease 0 has 0.03 m: must be at most half the thickness"),
         ("true", "pattern.hinge_offset = true: must be a number"),
     ],

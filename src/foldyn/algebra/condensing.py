@@ -80,8 +80,7 @@ class Condensing:
         SingularTangentError
             A matrix is not positive definite.
         """
-        where = np.zeros(self._size, np.int64)
-        condense(*self._factors, self._free, where, numbers.reshape(-1))
+        condense(*self._factors, self._free, np.zeros(self._size, np.int64), numbers.reshape(-1))
         out = np.moveaxis(numbers[self._block], -1, 0)
         if not np.isfinite(out).all():
             raise SingularTangentError("the matrix is not positive definite")
@@ -124,8 +123,7 @@ def condense(rows, pointers, entry, until, starts, free, where, numbers):
                 product = factor * eight(numbers, COUNT * np.int64(p))
                 put(numbers, at, eight(numbers, at) - product)
         if j < free:
-            first = COUNT * np.int64(pointers[j])
-            scale = 1.0 / math.sqrt(eight(numbers, first))
+            scale = 1.0 / math.sqrt(eight(numbers, COUNT * np.int64(pointers[j])))
             for p in range(pointers[j] + 1, pointers[j + 1]):
                 at = COUNT * np.int64(p)
                 put(numbers, at, scale * eight(numbers, at))

@@ -191,8 +191,7 @@ def _sparse(pencil: Pencil, count: int, known: NDArray, verify: bool) -> Spectru
         missed = pencil.below(edge) - checked if checked else 0
         if missed <= 0:
             break
-        beside = np.hstack([known, shapes])
-        more, others = _lanczos(pencil, shift, factors, missed + GUARD, beside)
+        more, others = _lanczos(pencil, shift, factors, missed + GUARD, np.hstack([known, shapes]))
         values, shapes = np.r_[values, more], np.hstack([shapes, others])
     values, shapes = _sorted(pencil, values, shapes, known)
     return Spectrum(values[:count], shapes[:, :count], shift, min(checked, count), missed)

@@ -154,10 +154,8 @@ class Rslab:
         from rslab import analyze
 
         if self._pattern is None or not self._pattern.fits(matrix):
-            pattern, threads = (
-                Pattern(matrix),
-                int(os.environ.get("NUMBA_NUM_THREADS", processors())),
-            )
+            pattern = Pattern(matrix)
+            threads = int(os.environ.get("NUMBA_NUM_THREADS", processors()))
             self._analysis = analyze(pattern.lower.astype(float), path="ldlt", threads=threads)
             self._pattern = pattern
         try:

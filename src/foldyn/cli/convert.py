@@ -43,8 +43,7 @@ def add_convert(commands: Any) -> None:
         "number or title of the frame, or number of the sample",
         "factor on all lengths, or displacements of a result",
     )
-    ending = "format of a result, where the ending does not name it"
-    add(command, str, {"--format": ending})
+    add(command, str, {"--format": "format of a result, where the ending does not name it"})
     add(command, integer, {
         "--every": "of a result, take every such sample",
         "--frames": "of a result, take so many samples, evenly",
@@ -59,8 +58,7 @@ def add_convert(commands: Any) -> None:
         "--divisions": "of input decks, pieces of every edge (16)",
         "--modes": "of input decks, how many frequencies (6)",
     })  # fmt: skip
-    kinds = "of Abaqus, kind of the triangles: STRI3 (default), S3"
-    add(command, str, {"--element": kinds})
+    add(command, str, {"--element": "of Abaqus, kind of the triangles: STRI3 (default), S3"})
     add_switches(command, figures=False)
 
 

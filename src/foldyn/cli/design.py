@@ -67,8 +67,7 @@ def run_design(given: argparse.Namespace) -> Path:
             results.keep(name, found.save)
         results.keep(WRITTEN[2], partial(write_case, case_file, found.parameters))
         say(f"wrote {folder / WRITTEN[0]}")
-        page = partial(write_design, found, plan, folder, case_file)
-        add_page(given, folder, noted, spent, page)
+        add_page(given, folder, noted, spent, partial(write_design, found, plan, folder, case_file))
     return folder
 
 

@@ -253,10 +253,7 @@ def count_compiled() -> Iterator[Callable[[], int]]:
 def use(name: str) -> int:
     """Run one of `STAGES` by name; return the number of functions it compiled."""
     (uses,) = (stage[name] for stage in STAGES if name in stage)
-    with (
-        count_compiled() as compiled,
-        quietly(),
-    ):
+    with count_compiled() as compiled, quietly():
         for compute in uses:
             compute()
         return compiled()

@@ -36,9 +36,8 @@ def add_fit(commands: Any) -> None:
         "values found, figures and report.html go to a folder; so does every evaluation of the "
         "model, so that an interrupted fit can be resumed.",
     )
-    named = "fit file, or case file (TOML) or the name of a shipped case"
     data = "with a case file: measurements (CSV, tracks of a film, or a result of kind modes)"
-    add(fit, str, {"file": named})
+    add(fit, str, {"file": "fit file, or case file (TOML) or the name of a shipped case"})
     add(fit, str, {"data": data}, nargs="*")
     many: dict[str, Any] = {"action": "append", "default": []}
     add(fit, str, {
@@ -81,8 +80,7 @@ def run_fit(given: argparse.Namespace) -> Path:
         for name, write in zip(WRITTEN, (found.save, found.save, found.write_case), strict=True):
             results.keep(name, write)
         say(f"wrote {folder / WRITTEN[0]}")
-        page = partial(write_fit, found, folder, plan.title)
-        add_page(given, folder, noted, spent, page)
+        add_page(given, folder, noted, spent, partial(write_fit, found, folder, plan.title))
     return folder
 
 
@@ -152,14 +150,12 @@ def _of_case(path: Path, given: argparse.Namespace) -> FitFile:
         raise InputError("--vary: missing; name what to fit, as in --vary sheet.thickness")
     if given.sigma and len(given.sigma) != len(given.data):
         raise InputError(f"--sigma: {len(given.sigma)} of them for {len(given.data)} data files")
-    sigmas = given.sigma or [None] * len(given.data)
     data = [
         recognize(Path(file), given.axis, name=Path(file).stem, sigma=sigma)
-        for file, sigma in zip(given.data, sigmas, strict=True)
+        for file, sigma in zip(given.data, given.sigma or [None] * len(given.data), strict=True)
     ]
     ties = dict(halves(text, "--tie") for text in given.tie)
-    parameters = tuple(map(_parameter, given.vary))
-    return FitFile(path, "", path, tuple(data), parameters, ties, {})
+    return FitFile(path, "", path, tuple(data), tuple(map(_parameter, given.vary)), ties, {})
 
 
 def _parameter(text: str) -> Any:

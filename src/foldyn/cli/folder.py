@@ -56,8 +56,7 @@ class Owner:
         digest = file_digest(file)
         with suppress(ValueError, OSError):  # no relative path leads to another drive
             file = Path(os.path.relpath(os.path.realpath(file), os.path.realpath(folder)))
-        source = shipped[0] if shipped else file.as_posix()
-        return cls(command, source, digest)
+        return cls(command, shipped[0] if shipped else file.as_posix(), digest)
 
     def same(self, stamp: dict[str, Any]) -> bool:
         """Whether a stamp names this owner; the file's content may have changed."""

@@ -41,8 +41,7 @@ def add_fold(commands: Any) -> None:
         "--angles FILE": 'angles (degrees), one a line: "mountain 90", "zigzag 60" (a family), '
         '"3 4 -120" (the crease between two vertices, valleys positive)',
     })  # fmt: skip
-    frame = "number or title of the frame to fold to, of the file"
-    add(aim, frame_of, {"--to-frame FRAME": frame})
+    add(aim, frame_of, {"--to-frame FRAME": "number or title of the frame to fold to, of the file"})
     add(command, integer, {"--steps": "states on the way (20)"}, default=20)
     starts = (
         "pattern, folded (open from the folded state), or auto (default): folded where the pattern "

@@ -49,17 +49,17 @@ def info() -> str:
     moving, drawn = (_part(partial(_installed, name), name) for name in ("nlopt", "cma"))
     drawings = _part(lambda: f"ezdxf {ezdxf().__version__}", "ezdxf")
     processors = os.cpu_count() or 1
+    ready = sum(map(compiled, METHODS))
     lines = [
         f"foldyn {__version__}",
         f"python {platform.python_version()}, {platform.system()} {platform.machine()}",
         *(f"{name} {_version(name)}" for name in REQUIRED),
         f"processors: {processors}; the motion of a large sheet runs on up to "
         f"{min(MOST, processors)}",
-    ]
-    for name in METHODS:
-        lines.append(f"kernels of {name}: {'ready' if compiled(name) else 'compiled on first use'}")
-    ready = sum(map(compiled, METHODS))
-    lines += [
+        *(
+            f"kernels of {name}: {'ready' if compiled(name) else 'compiled on first use'}"
+            for name in METHODS
+        ),
         f"kernels of {ready} of {len(METHODS)} methods ready; foldyn warm-up compiles all",
         f"optional parts: ffmpeg for MP4 animations, {video}",
         f"optional part for camera tracking: OpenCV, {camera}",

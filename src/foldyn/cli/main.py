@@ -67,8 +67,7 @@ def parser() -> argparse.ArgumentParser:
     flag(run, "--resume", "continue an interrupted motion from its last checkpoint")
     waits = "of a motion: computing time between checkpoints (default: 60)"
     add(run, number, {"--checkpoint SECONDS": waits})
-    places = {"--device": "of a motion: where its steps are computed"}
-    add(run, str, places, choices=("cpu", "gpu"))
+    add(run, str, {"--device": "of a motion: where its steps are computed"}, choices=("cpu", "gpu"))
 
     modes = _add_kind(
         commands, "modes", "natural frequencies and mode shapes of a case file of any kind",

@@ -60,12 +60,10 @@ def add_reading(
     command: argparse.ArgumentParser, frame: str, scale: str = "factor on all lengths"
 ) -> None:
     """Add options for reading a pattern file; `frame` and `scale` are their help texts."""
-    units = "unit of the coordinates of the file: mm, cm, m, in, ..."
     add(command, number, {"--scale": scale})
-    add(command, str, {"--unit": units})
+    add(command, str, {"--unit": "unit of the coordinates of the file: mm, cm, m, in, ..."})
     add(command, frame_of, {"--frame": frame})
-    alike = "distance (m) within which points of the file are one"
-    add(command, number, {"--tolerance": alike})
+    add(command, number, {"--tolerance": "distance (m) within which points of the file are one"})
     flag(command, "--flat-foldable", "move vertices to the nearest places that fold flat")
 
 

@@ -60,8 +60,7 @@ def run(given: Namespace) -> Path:
     with told.noting():  # warnings would distract from the one message on bad input
         case_file = _read(path, given)
         if getattr(given, "film", None):
-            output = replace(case_file.output, animation=given.film)
-            case_file = replace(case_file, output=output)
+            case_file = replace(case_file, output=replace(case_file.output, animation=given.film))
         changes = _device(case_file, getattr(given, "device", None))
         task = list[Computation]()
         for mass in case_file.masses:
@@ -85,8 +84,7 @@ def run(given: Namespace) -> Path:
     ):
         with noted_warnings(path if page else None) as noted:
             introduction = _introduction(case_file, told, say)
-            bar = not given.quiet and sys.stderr.isatty()
-            done = _computed(task, kept, introduction, bar, say)
+            done = _computed(task, kept, introduction, not given.quiet and sys.stderr.isatty(), say)
         call = Call(given.typed, tuple(noted), **clock.spent())
         say(f"wrote {', '.join(kept.kept)}")
         if page:
@@ -188,14 +186,13 @@ def _computed(
             with told.noting() if len(task) > 1 else nullcontext():
                 done[one.mass] = one.run(progress, introduction)
         except (ComputationError, MotionInterrupted) as error:
-            failed = type(error)(f"{one.place}{error}", error.partial)
             if error.partial is not None:
                 error.partial.attrs.setdefault("stopped_because", str(error))
                 results.keep(one.file, partial(save, error.partial))
                 if not isinstance(error, MotionInterrupted):
                     _saved(one, error.partial)
             told.issue()
-            raise failed from None
+            raise type(error)(f"{one.place}{error}", error.partial) from None
         result = done[one.mass]
         there = result.encoding.get("source") == str(results.folder / one.file)
         results.keep(one.file, partial(save, result) if not there else lambda _: None)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 import time
+from collections import Counter
 from collections.abc import Callable, Sequence
 from functools import partial
 from pathlib import Path
@@ -13,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 from foldyn.cli.folder import Results, add_page, held_by
 from foldyn.cli.options import add, add_figures, add_results, halves, integer
 from foldyn.cli.streams import Clock, noted_warnings, progress_bar, speech
-from foldyn.errors import ComputationError, InputError
+from foldyn.errors import ComputationError, InputError, within
 
 if TYPE_CHECKING:
     import xarray
@@ -55,10 +56,8 @@ def add_sweep(commands: Any) -> None:
     add(sweep, integer, {"--seed": "of the samples (default: 0)"})
     ties = {"--tie KEY=EXPRESSION": "a key that depends on others, such as b=360 - a"}
     add(sweep, str, ties, action="append")
-    count = "points at a time (default: one per processor)"
-    add(sweep, integer, {"--processes N": count})
-    workers = "Dask scheduler whose workers compute instead"
-    add(sweep, str, {"--scheduler ADDRESS": workers})
+    add(sweep, integer, {"--processes N": "points at a time (default: one per processor)"})
+    add(sweep, str, {"--scheduler ADDRESS": "Dask scheduler whose workers compute instead"})
     add(sweep, str, {
         "--device": "where motions are computed (default: as the file says, else auto: on a GPU "
         "where that pays)",
@@ -100,8 +99,7 @@ def run_sweep(given: argparse.Namespace) -> Path:
                 f"all {found.attrs['points']} points failed, the first with: "
                 f"{found['failure'].values.flat[0]}"
             )
-        page = partial(write_sweep, found, folder, plan.case_file)
-        add_page(given, folder, noted, spent, page)
+        add_page(given, folder, noted, spent, partial(write_sweep, found, folder, plan.case_file))
     return folder
 
 
@@ -117,12 +115,8 @@ def _plan(path: Path, given: argparse.Namespace) -> Plan:
         here = Path.cwd()
         if str(here) not in sys.path:
             sys.path.insert(0, str(here))  # as with `python -m`: for the user's modules
-        measures = []
-        for text in given.measure:
-            try:
-                measures.append(own_measure(text, here) or text)
-            except InputError as error:
-                raise InputError(f"--measure{error}") from None
+        with within("--measure"):
+            measures = [own_measure(text, here) or text for text in given.measure]
     asked = given.samples, given.method, given.seed, ties, given.device
     return plan_of(path, vary, measures, *asked)
 
@@ -172,8 +166,7 @@ def _swept(
                 failed = f", {course.failed} failed" if course.failed else ""
                 say(f"  {course.done} of {total} points{failed}, {_left(course.left)}")
 
-        folder = results.folder / KEPT
-        return swept(plan, given.processes, given.scheduler, folder, tell)
+        return swept(plan, given.processes, given.scheduler, results.folder / KEPT, tell)
 
 
 def _left(seconds: float) -> str:
@@ -193,9 +186,7 @@ def _tell_failed(found: xarray.Dataset, say: Callable[[str], None]) -> None:
     if not failed:
         return
     say(f"values are missing at {failed} of {found.attrs['points']} points:")
-    reasons: dict[str, int] = {}
-    for reason in filter(None, found["failure"].values.ravel().tolist()):
-        reasons[reason] = reasons.get(reason, 0) + 1
+    reasons = Counter(filter(None, found["failure"].values.ravel().tolist()))
     for reason, count in list(reasons.items())[:MOST_NAMED]:
         say(f"  {count} of them: {reason}")
     if len(reasons) > MOST_NAMED:

@@ -120,8 +120,7 @@ def track(given: Namespace) -> Path:
             form = given.figures or (None if "displacement" in ds else "png")
             written = [] if form is None else _figures(ds, out, given.inputs, film, form)
             call = Call(given.typed, tuple(noted), **clock.spent())
-            footage = _footage(given, written, thing, film, ds)
-            page = write_tracks_page(ds, out, footage, call)
+            page = write_tracks_page(ds, out, _footage(given, written, thing, film, ds), call)
             say(f"wrote {', '.join([*written, str(page)])}")
     return out
 
@@ -183,8 +182,7 @@ def modeled(name: str) -> Case | xarray.Dataset:
     if name.endswith(".nc"):
         return fd.load(name)
     case_file = fd.read_case(find_case(name))
-    static = case_file.analysis.kind == "statics"
-    return case_file.run() if static else case_file.case()
+    return case_file.run() if case_file.analysis.kind == "statics" else case_file.case()
 
 
 def summary(ds: xarray.Dataset) -> str:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator
+from contextlib import suppress
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -53,10 +55,8 @@ def write_design(
     designs = {"after": found.parameters, "before": plan.space.values(plan.first)}
     cases = {}
     for name, values in designs.items():
-        try:
+        with suppress(FoldynError):  # the guess may not give a case
             cases[name] = evaluator.case(values)
-        except FoldynError:  # the guess may not give a case
-            continue
     sections: list[Section | Stage] = [*_stages(plan, cases, designs, case_file)]
     sections += [Heading("The best design"), Text(_verdict(found, plan)), _parameters(found, plan)]
     if found.constraints:
@@ -87,8 +87,7 @@ def _stages(
     if case_file.analysis.kind not in SHOWN:
         return
     results = {name: plan.evaluator.result(designs[name]) for name in cases}
-    nodes = case_file.output.nodes.tolist()
-    yield stage(results, cases, f"{case_file.heading}: a design", nodes)
+    yield stage(results, cases, f"{case_file.heading}: a design", case_file.output.nodes.tolist())
 
 
 def _verdict(found: Design, plan: Plan) -> str:
@@ -138,9 +137,7 @@ def _ends(found: Design) -> Table:
 
 def _failures(found: Design) -> Iterator[Section]:
     """Designs that could not be computed, grouped by reason."""
-    reasons = dict[str, int]()
-    for reason in filter(None, found.history["failure"].values.tolist()):
-        reasons[reason] = reasons.get(reason, 0) + 1
+    reasons = Counter(filter(None, found.history["failure"].values.tolist()))
     if reasons:
         rows = [[count, reason] for reason, count in reasons.items()]
         caption = "Designs that could not be computed; near them the search took shorter steps."

@@ -7,7 +7,6 @@ import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from io import StringIO
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,7 +19,7 @@ from foldyn.designs.search import Row
 from foldyn.errors import InputError
 from foldyn.results import netcdf
 from foldyn.values import show, suggest
-from foldyn.writing import plain, write_json, write_text
+from foldyn.writing import plain, target_of, write_json, write_text
 
 PARAMETER, GRADIENT = "parameter_", "gradient_"
 """Prefixes of parameter names in datasets, for values and gradients."""
@@ -115,9 +114,7 @@ class Design:
         InputError
             The file name has another ending, or its folder does not exist.
         """
-        path = Path(path)
-        if not path.parent.is_dir():
-            raise InputError(f"{path}: the folder {path.parent} does not exist; make it first")
+        path = target_of(path)
         if path.suffix == ".json":
             write_json(self.summary(), path)
         elif path.suffix == ".nc":

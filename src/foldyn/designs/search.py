@@ -173,8 +173,7 @@ class Search:
         failure, values, trial, slopes = found.failure, dict[str, float](), None, None
         numbers = np.full(1 + len(self.problem.constraints), np.nan)
         if not failure:
-            measured = found.values[VALUES].tolist()
-            values = dict(zip(self.problem.measures, measured, strict=True))
+            values = dict(zip(self.problem.measures, found.values[VALUES].tolist(), strict=True))
             try:
                 if self.gradient:
                     rows = zip(self.problem.measures, found.values[JACOBIAN], strict=True)
@@ -200,8 +199,7 @@ class Search:
 
     def _trial(self, point: Point, numbers: NDArray, slopes: NDArray | None) -> Trial:
         """Scaled values of a design."""
-        signs = np.array([self.problem.sign, *self.problem.signs])
-        scale = signs / self.sizes
+        scale = np.array([self.problem.sign, *self.problem.signs]) / self.sizes
         scaled = numbers * scale
         by = np.zeros((len(scaled), 0)) if slopes is None else (
             slopes * scale[:, None] * (self.space.upper - self.space.lower)

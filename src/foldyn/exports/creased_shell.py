@@ -138,8 +138,7 @@ def creased_shell(case: Case, divisions: int | None = None) -> CreasedShell:
     axes, fibers = panel_axes(shell.pattern), material_axes(shell.pattern, shell.sheet)
     if fibers is not None:
         axes = np.stack([fibers, np.cross(shell.pattern.face_normals, fibers)], axis=1)
-    part = components(shell.pattern.weld_faces, len(shell.pattern.faces))
-    split = _Split(shell, part)
+    split = _Split(shell, components(shell.pattern.weld_faces, len(shell.pattern.faces)))
     clamped = np.zeros(len(split.origin), bool)
     for edge, row in zip(shell.options.clamped, shell.clamped_nodes, strict=True):
         panel = next(k for k, face in enumerate(shell.pattern.faces) if set(edge) <= set(face))

@@ -70,8 +70,7 @@ def write(
 
     along = ALONG[result.attrs["foldyn_result"]]
     samples = chosen_samples(result.sizes[along], every, frames)
-    whole_result = every is None and frames is None
-    taken = result if whole_result else result.isel({along: samples})
+    taken = result if every is None and frames is None else result.isel({along: samples})
     pattern = pattern_of(result)
     names = [*map(str, result.coords), *chosen_fields(quantities_of(result), fields)]
     content = {name: _values(taken[name]) for name in names}

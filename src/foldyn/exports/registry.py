@@ -19,6 +19,7 @@ from foldyn.input_files import path_of
 from foldyn.results import case_of, check_result, load
 from foldyn.values import choice, suggest
 from foldyn.viewer.stage import folding_case
+from foldyn.writing import target_of
 
 
 @dataclass(frozen=True)
@@ -201,9 +202,7 @@ def _file(path: Any) -> Path:
     file = path_of(path, "path")
     if file.is_dir():
         raise InputError(f"{file}: is a folder; name a file in it")
-    if not file.parent.is_dir():
-        raise InputError(f"{file}: the folder {file.parent} does not exist; make it first")
-    return file
+    return target_of(file)
 
 
 def _format_of(file: Path, name: str | None) -> Export:

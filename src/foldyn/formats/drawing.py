@@ -169,9 +169,8 @@ class Notes:
         for k, source in enumerate(sources):
             where = f" near {self.point(points[k])}" if len(points) else ""
             names.setdefault(self.line(int(source)) + where)
-        shown = list(names)[:_SHOWN]
         more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
-        return ", ".join(shown) + more
+        return ", ".join(list(names)[:_SHOWN]) + more
 
     def contradict(self, pairs: Sequence[tuple[int, int]]) -> None:
         """Report pairs of coincident lines where one is a mountain and the other a valley."""

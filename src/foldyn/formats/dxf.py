@@ -77,8 +77,7 @@ def read(text: str) -> Drawing:
     boxes = [box for box in controls if len(box)]
     if not boxes:
         raise InputError(": there are none that can be read; give a crease pattern", "lines")
-    every = np.concatenate(boxes)
-    if not (np.abs(every) <= LONGEST).all():
+    if not (np.abs(np.concatenate(boxes)) <= LONGEST).all():
         raise InputError(f": coordinates must be finite, and at most {LONGEST:g}", "lines")
     colors: Counter[tuple[RGB, RGB | None]] = Counter()
     chords, curved = Chords(boxes), 0
@@ -254,8 +253,7 @@ def write(pattern: Pattern) -> str:
     """
     warn_of_angles(pattern, "DXF")
     points = (PER_METER * flat_points(pattern, "DXF")).tolist()
-    library = ezdxf()
-    document = library.new("R2010", units=4)  # mm
+    document = ezdxf().new("R2010", units=4)  # mm
     space = document.modelspace()
     edges = letters(pattern)
     for letter in _COLOR_NUMBERS:

@@ -302,8 +302,7 @@ def _face_orders(fields: dict[str, Any]) -> list[list[int]]:
         pair = isinstance(row, list) and len(row) == 3 and _are_below(row[:2], count)
         return pair and type(row[2]) is int and abs(row[2]) < 2
 
-    give = f"two face numbers from 0 to {count - 1}, and 1, -1 or 0"
-    _check(FACE_ORDERS, rows, sound, give)
+    _check(FACE_ORDERS, rows, sound, f"two face numbers from 0 to {count - 1}, and 1, -1 or 0")
     return rows
 
 

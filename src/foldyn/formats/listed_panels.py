@@ -141,9 +141,8 @@ def _seam_points(
     points[:, : panels.points.shape[1]] = panels.points
     topology = build_topology(checked_faces(panels.faces, len(points)), points)
     normals = face_geometry(points, topology.faces).face_normals
-    pairs = seams(points, topology.faces, normals, topology.boundary, near)
     same: list[tuple[int, int]] = []
-    for one, other in pairs:
+    for one, other in seams(points, topology.faces, normals, topology.boundary, near):
         if {panels.letters.get(one), panels.letters.get(other)} & {"B", "C"}:
             continue
         c, d = other

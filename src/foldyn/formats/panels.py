@@ -155,8 +155,7 @@ def _parted(
         for end in edge
         if end in ends
     ]
-    groups = components(joined, len(corners)).tolist()
-    return dict(zip(corners, groups, strict=True))
+    return dict(zip(corners, components(joined, len(corners)).tolist(), strict=True))
 
 
 def _halved(panels: Panels, edges: list[Edge]) -> Panels:

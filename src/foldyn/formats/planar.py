@@ -149,10 +149,8 @@ def _with_crossings(lines: Lines, near_by: float, tolerance: float) -> tuple[Lin
         raise too_many(f"{len(pairs)} crossings")
     every = np.concatenate((points, places))
     number = merged(every, tolerance, kept=len(points))[len(points) :]
-    more = replace(lines, points=every)
-    hits = np.concatenate((np.column_stack((pairs[:, 0], number)),
-                           np.column_stack((pairs[:, 1], number))))  # fmt: skip
-    return more, hits[(ends[hits[:, 0]] != hits[:, 1:]).all(axis=1)]
+    hits = np.column_stack((pairs.T.ravel(), np.tile(number, 2)))
+    return replace(lines, points=every), hits[(ends[hits[:, 0]] != hits[:, 1:]).all(axis=1)]
 
 
 def _crossings(
@@ -183,8 +181,7 @@ def _cross(a: NDArray, b: NDArray) -> NDArray:
 def points_on(lines: Lines, tolerance: float) -> NDArray:
     """Rows (line, point), (k, 2), of the points that lie on a line without being its ends."""
     used = np.unique(lines.ends)
-    tree = STRtree(segments(lines))
-    number, line = tree.query(
+    number, line = STRtree(segments(lines)).query(
         shapely.points(lines.points[used]), predicate="dwithin", distance=tolerance
     )
     hits = np.column_stack((line, used[number]))
@@ -198,13 +195,11 @@ def _pieces(lines: Lines, hits: NDArray) -> Lines:
     point = np.concatenate((lines.ends[:, 0], lines.ends[:, 1], hits[:, 1]))
     start = lines.points[lines.ends[line, 0]]
     along = lines.points[lines.ends[line, 1]] - start
-    place = np.einsum("ij,ij->i", lines.points[point] - start, along)
-    order = np.lexsort((place, line))
+    order = np.lexsort((np.einsum("ij,ij->i", lines.points[point] - start, along), line))
     line, point = line[order], point[order]
     same = line[1:] == line[:-1]
     row = line[:-1][same]
-    ends = np.column_stack((point[:-1][same], point[1:][same]))
-    return replace(lines.taken(row), ends=ends)
+    return replace(lines.taken(row), ends=np.column_stack((point[:-1][same], point[1:][same])))
 
 
 GAP = 5e-3

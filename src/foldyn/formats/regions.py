@@ -102,9 +102,8 @@ def straightened(lines: Lines, suspects: NDArray, tolerance: float) -> Lines:
             continue
         along = lines.points[b] - lines.points[a]
         to = lines.points[point] - lines.points[a]
-        if abs(along[0] * to[1] - along[1] * to[0]) > tolerance * np.linalg.norm(along):
-            continue
-        if not 0 < to @ along < along @ along:
+        aside = abs(along[0] * to[1] - along[1] * to[0])
+        if aside > tolerance * np.linalg.norm(along) or not 0 < to @ along < along @ along:
             continue
         ends[one], kept[other] = (a, b), False
         drawn.add(edge_of(a, b))
@@ -154,5 +153,4 @@ def sheet(panels: Panels) -> tuple[Panels, NDArray, list[tuple[float, NDArray]]]
         if k != largest
     ]
     faces = tuple(face for face, k in zip(panels.faces, part, strict=True) if k == largest)
-    kept = Panels(panels.points, faces, panels.letters, panels.angles)
-    return kept, total[~outer], others
+    return Panels(panels.points, faces, panels.letters, panels.angles), total[~outer], others

@@ -157,11 +157,7 @@ def declared(element: Element, rules: Rules, place: str) -> Mapping[str, str]:
         tag, name = local(element), element.get("id", "")
         classes = set(element.get("class", "").split())
         for _, rule_tag, rule_id, rule_classes, found in rules:
-            if (
-                (not rule_tag or rule_tag == tag)
-                and (not rule_id or rule_id == name)
-                and rule_classes <= classes
-            ):
+            if rule_tag in ("", tag) and rule_id in ("", name) and rule_classes <= classes:
                 css |= found
     css |= declarations(element.get("style", ""))
     shaped = _SHAPING if local(element) in (*SHAPES, "use") else ()

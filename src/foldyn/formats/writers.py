@@ -27,9 +27,8 @@ def flat_points(pattern: Pattern, kind: str) -> NDArray[np.float64]:
         The pattern is folded or does not lie in a plane z = constant, so that a drawing (`kind`)
         would not show its true shape.
     """
-    heights = np.ptp(pattern.vertices[:, 2])
     folded = np.abs(pattern.dihedrals - np.pi) > 1e-6
-    if heights > PLANE * pattern.size or folded.any():
+    if np.ptp(pattern.vertices[:, 2]) > PLANE * pattern.size or folded.any():
         raise InputError(
             f": {kind} files hold flat patterns, and this one is "
             + (f"folded at {int(folded.sum())} creases" if folded.any() else "not level")

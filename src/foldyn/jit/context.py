@@ -104,13 +104,12 @@ def _fill(value: Any, slots: list[int]) -> tuple:
 def _array(context: Any, builder: Any, kind: Any, numbers: Sequence[Any]) -> Any:
     """View of the array with a given address, lengths and strides."""
     out = make_array(kind)(context, builder)
-    size = context.get_abi_sizeof(context.get_data_type(kind.dtype))
     populate_array(
         out,
         data=builder.inttoptr(numbers[0], out.data.type),
         shape=numbers[1 : 1 + kind.ndim],
         strides=numbers[1 + kind.ndim :],
-        itemsize=INT64(size),
+        itemsize=INT64(context.get_abi_sizeof(context.get_data_type(kind.dtype))),
         meminfo=None,
     )
     return out._getvalue()

@@ -145,8 +145,7 @@ def _spelled(kind: Any) -> str:
     if hasattr(kind, "fields"):
         inside = [f"{name}: {of}" for name, of in zip(kind.fields, inside, strict=True)]
     owner = getattr(kind, "instance_class", type(kind))
-    text = f"{owner.__module__}.{owner.__qualname__}({', '.join(inside)})"
-    return text
+    return f"{owner.__module__}.{owner.__qualname__}({', '.join(inside)})"
 
 
 def _plain(constant: Any) -> bool:

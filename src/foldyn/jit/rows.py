@@ -19,6 +19,7 @@ from foldyn.jit.intrinsics import DOUBLE, INT32, INT64, data_of, intrinsic
 LANES = 8
 ROW = ir.VectorType(DOUBLE, 4)
 COLUMN = ir.VectorType(DOUBLE, LANES)
+EVEN, ODD = (0, 8, 2, 10, 4, 12, 6, 14), (1, 9, 3, 11, 5, 13, 7, 15)  # lanes of two columns
 
 
 def _shuffle(builder, a, b, places):
@@ -72,9 +73,8 @@ def load_rows(typing_context, rows, nodes, start, step, mask, out, at, stride):
         a, b, c, d = (
             _shuffle(builder, r[i], r[j], range(8)) for i, j in ((0, 2), (1, 3), (4, 6), (5, 7))
         )
-        even, odd = (0, 8, 2, 10, 4, 12, 6, 14), (1, 9, 3, 11, 5, 13, 7, 15)
-        xz, uw = _shuffle(builder, a, b, even), _shuffle(builder, c, d, even)
-        y, v = _shuffle(builder, a, b, odd), _shuffle(builder, c, d, odd)
+        xz, uw = _shuffle(builder, a, b, EVEN), _shuffle(builder, c, d, EVEN)
+        y, v = _shuffle(builder, a, b, ODD), _shuffle(builder, c, d, ODD)
         low, high = (0, 1, 4, 5, 8, 9, 12, 13), (2, 3, 6, 7, 10, 11, 14, 15)
         columns = (
             _shuffle(builder, xz, uw, low),
@@ -104,10 +104,9 @@ def add_rows(typing_context, rows, nodes, start, step, mask, columns, at, stride
             for pointer in _columns_at(builder, data, *arguments[6:8])
         )
         zero = ir.Constant(COLUMN, [0.0] * LANES)
-        even, odd = (0, 8, 2, 10, 4, 12, 6, 14), (1, 9, 3, 11, 5, 13, 7, 15)
         front, back = (0, 1, 8, 9, 2, 3, 10, 11), (4, 5, 12, 13, 6, 7, 14, 15)
         r: list[Any] = [None] * LANES
-        for parity, places in enumerate((even, odd)):
+        for parity, places in enumerate((EVEN, ODD)):
             xy, z0 = _shuffle(builder, x, y, places), _shuffle(builder, z, zero, places)
             for base, half in ((0, front), (4, back)):
                 two = _shuffle(builder, xy, z0, half)

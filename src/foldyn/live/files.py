@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from functools import partial
 from html import escape
 from pathlib import Path
@@ -94,8 +95,7 @@ def _results(paths: Sequence[Path]) -> View:
 
 def _pattern(path: Path) -> View:
     """Stage of a pattern folding to its fold angles, or at rest if it has none or does not fold."""
-    pattern = read_pattern(path)
-    return View(path.stem, folded_stage(pattern, path.stem))
+    return View(path.stem, folded_stage(read_pattern(path), path.stem))
 
 
 def folded_stage(pattern: Pattern, title: str) -> Stage:
@@ -104,9 +104,6 @@ def folded_stage(pattern: Pattern, title: str) -> Stage:
     given = np.isfinite(wanted)
     moves = given.any() and float(np.abs(wanted - fold_angles(pattern))[given].max()) > 1e-6
     if moves and len(pattern.faces) <= MOST_FOLDED:
-        try:
-            with quietly():  # `foldyn fold` reports failures to fold
-                return results_stage({title: fold(pattern).path}, title)
-        except FoldynError:
-            pass
+        with suppress(FoldynError), quietly():  # `foldyn fold` reports failures to fold
+            return results_stage({title: fold(pattern).path}, title)
     return rest_stage(pattern, title)

@@ -136,23 +136,19 @@ class _Handler(BaseHTTPRequestHandler):
             return
         answer = self.server.answers.get(self.path)
         if answer is None:
-            self._refuse(HTTPStatus.NOT_FOUND, "there is nothing here")
-            return
+            return self._refuse(HTTPStatus.NOT_FOUND, "there is nothing here")
         if self.headers.get_content_type() != "application/json":
-            self._refuse(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, "send application/json")
-            return
+            return self._refuse(HTTPStatus.UNSUPPORTED_MEDIA_TYPE, "send application/json")
         length = self.headers.get("Content-Length", "")
         if not (length.isascii() and length.isdigit()):
-            self._refuse(HTTPStatus.LENGTH_REQUIRED, "say how long the body is")
-            return
+            return self._refuse(HTTPStatus.LENGTH_REQUIRED, "say how long the body is")
         if len(length) > 9 or int(length) > MOST_BYTES:
             self._refuse(HTTPStatus.REQUEST_ENTITY_TOO_LARGE, f"send at most {MOST_BYTES} bytes")
             return
         try:
             wish = json.loads(self.rfile.read(int(length)))
         except (ValueError, RecursionError):
-            self._refuse(HTTPStatus.BAD_REQUEST, "this is no JSON")
-            return
+            return self._refuse(HTTPStatus.BAD_REQUEST, "this is no JSON")
         self._send(HTTPStatus.OK, "application/json", json.dumps(answer(wish)).encode())
 
     def log_message(self, format: str, *args: Any) -> None:

@@ -66,10 +66,9 @@ class HingeFormulas:
 
     def __post_init__(self) -> None:
         """Refuse incomplete formulas, for which kernels would return nan."""
-        formulas = self.energy, self.moment, self.slope
         by_rest = self.energy_by_rest, self.moment_by_rest
         lacks = []
-        if not all(map(of_turn, formulas)) and None in by_rest:
+        if not all(map(of_turn, (self.energy, self.moment, self.slope))) and None in by_rest:
             lacks.append("energy_by_rest and moment_by_rest, as a formula takes theta and rest")
         if (count := parameters_of(self.moment)) and self.by_parameters is None:
             lacks.append("by_parameters, the derivatives of the moment by its parameters")

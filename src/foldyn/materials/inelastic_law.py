@@ -91,8 +91,7 @@ class MemoryLaw(HingeLaw):
     def check(self, field: str) -> None:
         """Refuse an elastic part without stiffness at rest."""
         self.elastic.check("fold_law")
-        stiff = self.elastic.slope(np.pi, np.pi)
-        if not stiff > 0.0:
+        if not self.elastic.slope(np.pi, np.pi) > 0.0:
             raise InputError(
                 f": {self.name} uses shares of the stiffness at rest, and {self.elastic.name!r} "
                 'has none there; give law = "linear" or "enhanced"',

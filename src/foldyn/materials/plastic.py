@@ -100,8 +100,7 @@ class Plastic(MemoryLaw):
         """Branches of the law; see `MemoryLaw`."""
         per = length / stiffness
         values = (per * x for x in (self.yield_moment, self.isotropic, self.kinematic))
-        table = columns(len(per), *values)
-        return (Branch(CODE, table, 0.0, 0.0, np.ones(len(per))),)
+        return (Branch(CODE, columns(len(per), *values), 0.0, 0.0, np.ones(len(per))),)
 
     def lost_slope(self, stiffness: NDArray, length: NDArray) -> NDArray:
         """See `MemoryLaw`."""

@@ -33,9 +33,8 @@ def moment(turn):
     Loops over it vectorize, as it has no branches: (d y)(|d| y) with y = |d|^(-1/3), from a guess
     (3 % off) and two steps of order 4; exact to 3 ulp.
     """
-    a = choose(
-        abs(turn) > 1e-200, abs(turn), 1e-200
-    )  # for smaller turns y^3 would overflow; the moment is zero
+    # for smaller turns y^3 would overflow; the moment is zero
+    a = choose(abs(turn) > 1e-200, abs(turn), 1e-200)
     y = per_cube_root(a)
     r = 1.0 - a * y * y * y
     y = y + y * r * (1.0 / 3.0 + r * (2.0 / 9.0 + r * (14.0 / 81.0)))

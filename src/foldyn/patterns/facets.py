@@ -195,8 +195,7 @@ def corner_turns(x: NDArray, normal: NDArray) -> NDArray[np.float64]:
     along = np.roll(x, -1, axis=0) - x
     before = np.roll(along, 1, axis=0)
     left = np.einsum("ij,j->i", np.cross(before, along), normal)
-    ahead = np.einsum("ij,ij->i", before, along)
-    return np.arctan2(left, ahead)
+    return np.arctan2(left, np.einsum("ij,ij->i", before, along))
 
 
 Face = tuple[int, ...]

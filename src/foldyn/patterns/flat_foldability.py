@@ -70,9 +70,8 @@ class FlatFoldability:
         """Whether mountains minus valleys are 2 or -2 (k,), or can be once all have letters."""
         least = self.mountains - self.valleys - self.unassigned
         most = self.mountains - self.valleys + self.unassigned
-        even = self.degrees % 2 == 0
         reached = ((least <= 2) & (most >= 2)) | ((least <= -2) & (most >= -2))
-        return (self.degrees == 0) | (even & reached)
+        return (self.degrees == 0) | ((self.degrees % 2 == 0) & reached)
 
     def kawasaki(self, tolerance: float) -> NDArray[np.bool_]:
         """Whether the alternating sum is zero within a tolerance (rad) (k,)."""
@@ -281,8 +280,7 @@ class _Conditions:
             corners += [(len(corners), *corner) for corner in found if corner and None not in found]
         self.panel, *self.turns = np.array(corners, np.int64).reshape(-1, 5).T
         _, self.panel = np.unique(self.panel, return_inverse=True)
-        around_panels = self.at(drawn)[0][len(vertices) :]
-        kept = np.abs(around_panels)[self.panel] < NEARLY_PLANE
+        kept = np.abs(self.at(drawn)[0][len(vertices) :])[self.panel] < NEARLY_PLANE
         _, self.panel = np.unique(self.panel[kept], return_inverse=True)
         self.turns = [column[kept] for column in self.turns]
 

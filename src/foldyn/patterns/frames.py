@@ -61,8 +61,7 @@ def composed(pattern: Pattern, angles: NDArray) -> tuple[NDArray[np.float64], fl
     shift = np.zeros((len(pattern.faces), 3))
     for face, other, k, way in walk(beside, len(pattern.faces)):
         a, b = axes[k]
-        turn = -way * turns[k] * (b - a) / np.linalg.norm(b - a)
-        own = Rotation.from_rotvec(turn).as_matrix()
+        own = Rotation.from_rotvec(-way * turns[k] * (b - a) / np.linalg.norm(b - a)).as_matrix()
         rotation[other] = rotation[face] @ own
         shift[other] = rotation[face] @ (a - own @ a) + shift[face]
     corners = np.concatenate(pattern.faces)

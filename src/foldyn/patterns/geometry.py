@@ -85,8 +85,7 @@ def face_geometry(vertices: NDArray, faces: Faces) -> FaceGeometry:
             distance = np.linalg.norm(np.roll(corners, -shift, axis=1) - corners, axis=2)
             diameter[which] = np.maximum(diameter[which], distance.max(axis=1))
             shortest[which] = np.minimum(shortest[which], distance.min(axis=1))
-        height = np.einsum("fvc,fc->fv", corners, normals[which])
-        planarity[which] = np.abs(height).max(axis=1)
+        planarity[which] = np.abs(np.einsum("fvc,fc->fv", corners, normals[which])).max(axis=1)
         crossed[which] = _crosses_itself(corners, normals[which], diameter[which])
     for bad, text, sizes in (
         (
@@ -112,7 +111,6 @@ def face_geometry(vertices: NDArray, faces: Faces) -> FaceGeometry:
 
 def _crosses_itself(corners: NDArray, normals: NDArray, diameter: NDArray) -> NDArray:
     """Whether two edges of a face, seen along its normal, cross (touching does not count)."""
-    size = corners.shape[1]
     after = np.roll(corners, -1, axis=1)
     least = _DEGENERATE * diameter[:, None] ** 2
     result = np.zeros(len(corners), dtype=bool)
@@ -121,7 +119,7 @@ def _crosses_itself(corners: NDArray, normals: NDArray, diameter: NDArray) -> ND
         turn = np.einsum("fvc,fc->fv", np.cross(b - a, c - a), normals)
         return np.where(np.abs(turn) > least, np.sign(turn), 0).astype(np.int8)
 
-    for shift in range(2, size // 2 + 1):
+    for shift in range(2, corners.shape[1] // 2 + 1):
         other, other_after = np.roll(corners, -shift, axis=1), np.roll(after, -shift, axis=1)
         parted = side(corners, after, other) * side(corners, after, other_after) < 0
         parts = side(other, other_after, corners) * side(other, other_after, after) < 0
@@ -189,8 +187,7 @@ def seams(
     near : float
         Distance within which points coincide, relative to the size of the pattern.
     """
-    place = _places(vertices, boundary, near)
-    ends = np.sort(place[boundary], axis=1)
+    ends = np.sort(_places(vertices, boundary, near)[boundary], axis=1)
     _, group, count = np.unique(ends, axis=0, return_inverse=True, return_counts=True)
     doubled = np.flatnonzero(count[group.ravel()] > 1)
     if not len(doubled):

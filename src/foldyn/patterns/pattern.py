@@ -228,8 +228,7 @@ class Pattern(Transforms):
         x, sizes = self.vertices, [len(face) for face in self.faces]
         here = np.concatenate(self.faces)
         there = np.concatenate([(*face[1:], face[0]) for face in self.faces])
-        length = np.linalg.norm(x[here] - x[there], axis=1)
-        return np.split(length, np.cumsum(sizes)[:-1])
+        return np.split(np.linalg.norm(x[here] - x[there], axis=1), np.cumsum(sizes)[:-1])
 
     def __repr__(self) -> str:
         """One line: name and counts."""

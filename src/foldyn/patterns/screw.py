@@ -20,9 +20,8 @@ from foldyn.arguments import Check, Checked
 from foldyn.errors import InputError, UnitsWarning
 from foldyn.values import number, show, vector
 
-SPREAD = (
-    1e-6  # least extent of points across a line, relative to their size, to determine a rotation
-)
+SPREAD = 1e-6
+"""Least extent of points across a line, relative to their size, to determine a rotation."""
 STILL = 1e-9  # rad: a smaller rotation counts as zero
 
 
@@ -122,8 +121,7 @@ def of_twist(twist: NDArray) -> Screw:
     if angle < STILL:
         return translation(move)
     axis = turn / angle
-    point = np.cross(turn, move) / angle**2
-    return _screw(axis, angle, float(move @ axis), point)
+    return _screw(axis, angle, float(move @ axis), np.cross(turn, move) / angle**2)
 
 
 def _screw(axis: NDArray, angle: float, shift: float, point: NDArray) -> Screw:

@@ -30,7 +30,7 @@ from foldyn.patterns.crease_data import crease_values
 from foldyn.patterns.facets import flattened
 from foldyn.patterns.pattern import Pattern, pattern_of, refuse_junctions
 from foldyn.patterns.topology import around, edge_lookup, edge_of, walk
-from foldyn.values import SHORTEST, number, number_or_list, show
+from foldyn.values import SHORTEST, number, number_or_list, one_or_each, show
 
 SAME = 1e-9  # positions and heights closer than this, relative to the size, are equal
 SIDES = {"V": 0.5, "M": -0.5, "F": 0.0}  # height of a hinge line divided by the thickness
@@ -105,16 +105,13 @@ def thicken(
                 )
             vertices[vertex], placed[vertex] = place, True
     starts = np.concatenate([[0], np.cumsum([len(face) for face in pattern.faces])])
-    boards = Boards(starts, np.concatenate(middles), sizes)
-    return pattern.changed(vertices=vertices, boards=boards)
+    return pattern.changed(vertices=vertices, boards=Boards(starts, np.concatenate(middles), sizes))
 
 
 def _thickness(given: Any, pattern: Pattern) -> NDArray[np.float64]:
     """Thickness of each panel (np,)."""
-    sizes = np.array(number_or_list("thickness", given, "panel"))
-    count = len(pattern.faces)
-    if sizes.ndim and len(sizes) != count:
-        raise InputError(f": {len(sizes)} values for {count} panels: give one each", "thickness")
+    each = number_or_list("thickness", given, "panel")
+    sizes = one_or_each("thickness", each, len(pattern.faces), "panels")
     if not (sizes >= SHORTEST).all():
         raise InputError(f" = {show(given)}: must be greater than 0", "thickness")
     if len(pattern.welds):
@@ -130,7 +127,7 @@ def _thickness(given: Any, pattern: Pattern) -> NDArray[np.float64]:
     bent = np.flatnonzero(pattern.face_planarity > SAME)
     if bent.size:
         raise InputError(f": panel {bent[0]} is not flat, and a board is; cut it in two", "pattern")
-    return np.broadcast_to(sizes, (count,)).copy()
+    return sizes
 
 
 def _heights(offsets: Any, sizes: NDArray, pattern: Pattern) -> NDArray[np.float64]:
@@ -166,10 +163,8 @@ def _given_heights(offsets: Any, pattern: Pattern) -> tuple[NDArray[np.float64],
         return crease_values("offsets", each, pattern)
     if offsets is None:
         return np.zeros(count), np.zeros(count, bool)
-    height = np.array(number_or_list("offsets", offsets, "crease"))
-    if height.ndim and len(height) != count:
-        raise InputError(f": {len(height)} values for {count} creases: give one each", "offsets")
-    return np.broadcast_to(height, (count,)), np.ones(count, bool)
+    height = number_or_list("offsets", offsets, "crease")
+    return one_or_each("offsets", height, count, "creases"), np.ones(count, bool)
 
 
 def _corner_heights(height: NDArray, pattern: Pattern) -> list[NDArray[np.float64]]:

@@ -68,11 +68,9 @@ def glue(vertices: Sequence[NDArray], edges: Sequence[NDArray], tolerance: float
     rim = np.concatenate([part + start for part, start in zip(edges, starts, strict=False)])
     owner = np.repeat(np.arange(len(edges)), [len(part) for part in edges])
     ends = points[rim].reshape(-1, 6)
-    turned = points[rim[:, ::-1]].reshape(-1, 6)
     tree, same, joined = cKDTree(ends), [], 0
-    for other, flip in ((turned, True), (ends, False)):
-        near = tree.query_ball_tree(cKDTree(other), tolerance * np.sqrt(2.0))
-        for e, matches in enumerate(near):
+    for other, flip in ((points[rim[:, ::-1]].reshape(-1, 6), True), (ends, False)):
+        for e, matches in enumerate(tree.query_ball_tree(cKDTree(other), tolerance * np.sqrt(2.0))):
             for f in matches:
                 if owner[e] < owner[f]:
                     same += zip(rim[e], rim[f][::-1] if flip else rim[f], strict=True)
@@ -160,14 +158,12 @@ def _translations(
     pairs = cKDTree(shifts).query_pairs(4.0 * tolerance, output_type="ndarray")
     group = components(pairs, len(shifts))
     order = np.argsort(group, kind="stable")
-    bounds = np.flatnonzero(np.diff(group[order])) + 1
     return [
         (shifts[members].mean(axis=0), np.unique([one[members], two[members]]))
-        for members in np.split(order, bounds)
+        for members in np.split(order, np.flatnonzero(np.diff(group[order])) + 1)
         if len(members)
     ]
 
 
 def _angle(one: NDArray, two: NDArray) -> float:
-    across = np.linalg.norm(np.cross(one, two))
-    return float(np.arctan2(across, abs(one @ two)))
+    return float(np.arctan2(np.linalg.norm(np.cross(one, two)), abs(one @ two)))

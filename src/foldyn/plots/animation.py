@@ -93,8 +93,7 @@ def animate(
     traveled = _center_path(sheet, moving)
     if traveled is not None:
         keys.append(style.key("center of mass", **_PATH, marker="o", markersize=4.0))
-    legend_rows = -(-len(keys) // 3)
-    figure, axes = scene.view_figure(extent, sight, title or " ", legend_rows, _WIDTH)
+    figure, axes = scene.view_figure(extent, sight, title or " ", -(-len(keys) // 3), _WIDTH)
     add_undeformed(axes, sheet)
     drawn = DrawnSheet(axes, sheet, moving[0], sight, actuated=sheet.highlights)
     dots = [] if traveled is None else [(_draw_path(axes, traveled), traveled)]

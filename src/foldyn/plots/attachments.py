@@ -7,21 +7,9 @@ from typing import Any
 import numpy as np
 from matplotlib.patches import Patch
 
-from foldyn.cases import (
-    Bar,
-    Cable,
-    Case,
-    Dashpot,
-    Fix,
-    Impose,
-    Latch,
-    Link,
-    Spring,
-    Stop,
-    resolve_nodes,
-)
+from foldyn import cases
 from foldyn.cases.directions import unit_vector
-from foldyn.cases.selection import resolve_creases
+from foldyn.cases.selection import resolve_creases, resolve_nodes
 from foldyn.mechanics.lines import GROUND
 from foldyn.patterns.topology import around, edge_of
 from foldyn.plots import marks, style
@@ -52,11 +40,11 @@ def springs_and_masses(
     springs = [
         line[None]
         for i, part in enumerate(case.supports if supports else ())
-        if isinstance(part, Spring)
+        if isinstance(part, cases.Spring)
         for line in _of_part(sheet, points, part, f"supports[{i}]", size, view)
     ]
     polylines = case.polylines() if supports else ()
-    for kind, text, width in ((Bar, "bar", 2.2), (Cable, "cable", 1.1)):
+    for kind, text, width in ((cases.Bar, "bar", 2.2), (cases.Cable, "cable", 1.1)):
         lines = [
             np.where(node[:, None] < 0, x, points[node])[None]
             for part, node, x in polylines
@@ -68,7 +56,7 @@ def springs_and_masses(
     if springs:
         key = style.key("spring", color=style.SPRING, linewidth=1.1)
         found.append(Mark(style.SPRING, [key], springs, zorder=6.5, width=1.1))
-    for kind, text, marker in ((Stop, "end stop", "s"), (Latch, "latch", "D")):
+    for kind, text, marker in ((cases.Stop, "end stop", "s"), (cases.Latch, "latch", "D")):
         chosen = [
             resolve_creases(sheet.structure, part.creases)
             for part in (case.supports if supports else ())
@@ -96,7 +84,7 @@ def springs_and_masses(
 
 
 def _of_part(
-    sheet: Sheet3D, points: Points, spring: Spring, place: str, size: float, view: View
+    sheet: Sheet3D, points: Points, spring: cases.Spring, place: str, size: float, view: View
 ) -> list[Points]:
     """Zigzags of the springs of a support."""
     axes, lines = spring.directions, []
@@ -147,13 +135,13 @@ def _hatched(sheet: Sheet3D, points: Points, edges: Any, size: float) -> Points:
     return np.array(lines).reshape(-1, 2, 3)
 
 
-def direction_triangles(case: Case, kind: type, points: Points, size: float, sight: View) -> Points:
+def direction_triangles(
+    case: cases.Case, kind: type[cases.Fix | cases.Impose], points: Points, size: float, sight: View
+) -> Points:
     """Triangles (k, 3, 3) at nodes held along directions by one kind, `Fix` or `Impose`."""
     middle, found = points.mean(axis=0), []
     for support in case.supports:
-        if not isinstance(support, Fix | Impose) or type(support) is not kind:
-            continue
-        if support.direction is None:
+        if not isinstance(support, kind) or support.direction is None:
             continue
         nodes, unit = resolve_nodes(case.structure, support.nodes), unit_vector(support.direction)
         values = np.broadcast_to(getattr(support, "value", 0.0), (len(nodes),))
@@ -165,11 +153,11 @@ def direction_triangles(case: Case, kind: type, points: Points, size: float, sig
     return np.array(found).reshape(-1, 3, 3)
 
 
-def links(case: Case, points: Points) -> list[Mark]:
+def links(case: cases.Case, points: Points) -> list[Mark]:
     """Lines from the first of some linked nodes to the others, or from riders to carriers."""
     segments, tied = [], []
     for support in case.supports:
-        if isinstance(support, Link):
+        if isinstance(support, cases.Link):
             nodes = resolve_nodes(case.structure, support.nodes).tolist()
             first, others = ([nodes[0]], nodes[1:]) if support.to is None else (support.to, nodes)
             segments += [[points[a], points[b]] for a in first for b in others]
@@ -192,7 +180,7 @@ HALF = 0.45  # half of the cup's width, relative to its length
 REACH = 1.8  # length of the line from a node to the ground, in cups
 
 
-def dashpot_lines(case: Case, points: Points, size: float, view: View) -> Points:
+def dashpot_lines(case: cases.Case, points: Points, size: float, view: View) -> Points:
     """Segments (k, 2, 3) of the symbols of all dashpots of a case, at node positions (n, 3).
 
     size : length of a cup, m.
@@ -206,13 +194,13 @@ def dashpot_lines(case: Case, points: Points, size: float, view: View) -> Points
     return np.array(segments).reshape(-1, 2, 3)
 
 
-def describe_dashpot(dashpot: Dashpot) -> str:
+def describe_dashpot(dashpot: cases.Dashpot) -> str:
     """Describe a dashpot in words: how strong it is, and what it connects."""
     to = "to the ground" if dashpot.between is None else "between nodes"
     return f"dashpot {dashpot.coefficient:.4g} N s/m {to}"
 
 
-def _grounded_end(dashpot: Dashpot, node: Points, size: float) -> Points:
+def _grounded_end(dashpot: cases.Dashpot, node: Points, size: float) -> Points:
     """Position of the grounded end: along the dashpot's direction, or else below the node."""
     down = np.array([0.0, 0.0, -1.0])
     along = down if dashpot.direction is None else unit_vector(dashpot.direction)

@@ -221,8 +221,7 @@ def plot_lyapunov_exponent(found: xr.Dataset, title: str = "") -> Figure:
     axes.axhline(0.0, color=style.GRAY, linewidth=0.6, zorder=1)
     axes.axhspan(last - 2.0 * error, last + 2.0 * error, color=style.SKY, alpha=0.35, linewidth=0)
     axes.plot(found["time"].values, found["estimate"].values, color=style.BLUE, linewidth=1.2)
-    text = f"{last:.4g} ± {error:.2g} 1/s"
-    axes.set_title(text, **style.FINE, loc="right", y=1.0, pad=4.0)
+    axes.set_title(f"{last:.4g} ± {error:.2g} 1/s", **style.FINE, loc="right", y=1.0, pad=4.0)
     return style.finish(figure)
 
 

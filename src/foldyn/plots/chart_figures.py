@@ -43,8 +43,7 @@ def figure_of(
         Arguments of `Figure.subplots`: "sharex", "sharey".
     """
     figure = style.new_figure(*size, title)
-    rows = -(-len(charts) // columns)
-    frames = figure.subplots(rows, columns, squeeze=False, **grid)
+    frames = figure.subplots(-(-len(charts) // columns), columns, squeeze=False, **grid)
     keys: dict[str, Line2D] = {}
     for k, (axes, chart) in enumerate(zip(frames.flat, charts, strict=False)):
         below, left = k + columns >= len(charts), k % columns == 0

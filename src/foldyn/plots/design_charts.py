@@ -32,8 +32,7 @@ def convergence_charts(history: xr.Dataset) -> list[Chart]:
     if "constraint" in history.dims:
         with np.errstate(divide="ignore"):
             decades = np.log10(np.maximum(violation, 0.1 * history.attrs["slack"]))
-        slack = np.full(2, np.log10(history.attrs["slack"]))
-        allowed = Curve("slack", number[[0, -1]], slack)
+        allowed = Curve("slack", number[[0, -1]], np.full(2, np.log10(history.attrs["slack"])))
         charts.append(Chart(along, "log10 of the largest violation", [*curves(decades), allowed]))
     return charts
 

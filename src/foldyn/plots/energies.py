@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 import xarray as xr
@@ -12,22 +12,9 @@ from numpy.typing import NDArray
 
 from foldyn.dynamics import audit
 from foldyn.errors import InputError
-from foldyn.mechanics.contact.term import GROUP as CONTACT
-from foldyn.mechanics.springs import GROUP
 from foldyn.plots import readings, style
 from foldyn.plots.chart_figures import figure_of
 from foldyn.plots.charts import Chart, Curve
-
-COLORS: Mapping[str, str] = {
-    "strain_bars": style.VERMILLION,
-    "strain_membrane": style.VERMILLION,
-    "strain_panels": style.VERMILLION,
-    "strain_bends": style.PURPLE,
-    "strain_bending": style.PURPLE,
-    "strain_folds": style.GREEN,
-    GROUP: style.SKY,
-    CONTACT: style.BLUE,
-}
 
 
 def energy_error(trajectory: xr.Dataset) -> NDArray[np.float64]:
@@ -145,7 +132,7 @@ def plot_path_energies(
     figure, (upper, lower) = style.rows((7.0, 5.0), title, name, labels, heights=[1.8, 1.0])
     energies = readings.stacked(path)
     names, colors = zip(
-        *((readings.strain_name(part), COLORS.get(part, style.GRAY)) for part in energies),
+        *((readings.strain_name(part), readings.strain_color(part)) for part in energies),
         strict=True,
     )
     handles = upper.stackplot(x, *energies.values(), labels=names, colors=colors, alpha=0.75)

@@ -67,8 +67,7 @@ def plot_fidelity(fidelity: Fidelity, title: str = "") -> Figure:
         arrow = look | {"marker": "$\\uparrow$", "markersize": 9.0, "linestyle": "none"}
         upper.plot(frequency[beyond], np.full(beyond.sum(), 107.0 * MOST), **arrow)
         lower.plot(frequency, result["mac"].values[:, k], **look, **line)
-        name = "the case's own model" if model == "own" else model
-        keys.append(style.key(name, **look, **line))
+        keys.append(style.key("the case's own model" if model == "own" else model, **look, **line))
     upper.set_ylim(bottom, top)
     lower.set_ylim(-0.05, 1.05)
     lower.text(0.006, 0.06, "lost", transform=lower.transAxes, va="bottom", **style.FINE)
@@ -77,8 +76,7 @@ def plot_fidelity(fidelity: Fidelity, title: str = "") -> Figure:
         dashes = {"color": style.BLACK, "linewidth": 1.0, "linestyle": (0, (4, 2))}
         for axes in (upper, lower):
             axes.axvline(fidelity.limit, **dashes)
-        text = f"0.6 of the plate frequency, {hertz(fidelity.limit)} Hz"
-        keys.append(style.key(text, **dashes))
+        keys.append(style.key(f"0.6 of the plate frequency, {hertz(fidelity.limit)} Hz", **dashes))
     return style.finish(figure, keys, columns=4, width=7.6)
 
 

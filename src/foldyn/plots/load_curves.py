@@ -45,11 +45,10 @@ def on_panels(case: Case, kind: type[Pressure] | type[Temperature]) -> list[Shar
 
 def moments(case: Case) -> list[Share]:
     """Moments of whole creases, a `Share` for each load."""
-    found = []
-    for place, load in case.loads_of(CreaseMoment):
-        creases, moment = load.of_creases(case.structure, place)
-        found.append(Share(creases, moment, load.history))
-    return found
+    return [
+        Share(*load.of_creases(case.structure, place), load.history)
+        for place, load in case.loads_of(CreaseMoment)
+    ]
 
 
 def panel_middles(structure: Discretized, points: Points, share: Share) -> Points:

@@ -113,11 +113,10 @@ def about_state(
         length("amplitude", amplitude)
     moved = found["displacement"].transpose("node", "axis").values
     sheet.check_nodes(whose, moved)
-    state = "undeformed" if not moved.any() else "equilibrium"
     sheet = replace(sheet, nodes=sheet.nodes + moved)
     shapes = found["shape"].transpose("mode", "node", "axis").sel(mode=numbers).values
     swings = np.array([readable(sheet, shape, amplitude) for shape in shapes])
-    return sheet, swings, rest_keys(state=state)
+    return sheet, swings, rest_keys(state="undeformed" if not moved.any() else "equilibrium")
 
 
 def mode_names(

@@ -168,9 +168,8 @@ def _draw_curve(axes: Axes, curve: _Curve, color: str, zorder: float) -> None:
     for number, (start, stop, stable) in enumerate(readings.stretches(path)):
         part = slice(start, stop + 1)
         look: dict[str, Any] = {"color": color, "linewidth": 1.4, "zorder": zorder}
-        dashes = "solid" if stable else _UNSTABLE
         name = label if number == 0 and label else f"_{label}{number}"
-        axes.plot(x[part], y[part], linestyle=dashes, label=name, **look)
+        axes.plot(x[part], y[part], linestyle="solid" if stable else _UNSTABLE, label=name, **look)
     if len(x) == 1:  # a single point has no line
         axes.plot(x, y, marker=".", color=color, label=label)
     for kind, mark in _MARKS.items():

@@ -64,12 +64,11 @@ def draw_patterns(
     sheets = [Sheet3D.of(pattern) for pattern in several]
     if not sheets:
         raise InputError(" is empty: give at least one pattern", "patterns")
-    given = [*views, *[None] * (len(sheets) - len(views))]
     sights = [
         View(*(_ABOVE if np.ptp(sheet.nodes[:, 2]) < FLAT * sheet.size else _ASLANT))
         if view is None
         else View(*view)
-        for view, sheet in zip(given, sheets, strict=True)
+        for view, sheet in zip([*views, *[None] * (len(sheets) - len(views))], sheets, strict=True)
     ]
     cell = width / len(sheets)
     flat = [sight.flat(sheet.nodes) for sight, sheet in zip(sights, sheets, strict=True)]

@@ -18,6 +18,7 @@ from foldyn.errors import InputError
 from foldyn.linear.frf import PER_FORCE, quantity_of
 from foldyn.mechanics.contact.term import GROUP as CONTACT
 from foldyn.mechanics.springs import GROUP
+from foldyn.patterns.palette import BLUE, GRAY, GREEN, PURPLE, SKY, VERMILLION
 from foldyn.results.contents import nodes_of
 from foldyn.results.quantities import RESPONSES
 from foldyn.structures import Structure
@@ -152,8 +153,7 @@ def displacements(result: xr.Dataset, dimension: str = "step") -> NDArray[np.flo
 
 def way(path: xr.Dataset) -> NDArray[np.float64]:
     """Mean distance (m) that the nodes have traveled up to each point; it never decreases."""
-    motion = np.diff(displacements(path), axis=0)
-    steps = np.sqrt((motion**2).sum(axis=2).mean(axis=1))
+    steps = np.sqrt((np.diff(displacements(path), axis=0) ** 2).sum(axis=2).mean(axis=1))
     return np.concatenate([[0.0], np.cumsum(steps)])
 
 
@@ -225,16 +225,16 @@ def asked(
     return numbers, main_direction(paths, numbers) if direction is None else direction
 
 
-# Names of strain energies in stacking order from the bottom up: folds are on top.
-STRAIN: Mapping[str, str] = {
-    "strain_bars": "bars",
-    "strain_membrane": "membrane",
-    "strain_panels": "panels",
-    "strain_bends": "bends",
-    "strain_bending": "bending",
-    "strain_folds": "folds",
-    GROUP: "springs",
-    CONTACT: "contact",
+# Names and colors of strain energies in stacking order from the bottom up: folds are on top.
+STRAIN: Mapping[str, tuple[str, str]] = {
+    "strain_bars": ("bars", VERMILLION),
+    "strain_membrane": ("membrane", VERMILLION),
+    "strain_panels": ("panels", VERMILLION),
+    "strain_bends": ("bends", PURPLE),
+    "strain_bending": ("bending", PURPLE),
+    "strain_folds": ("folds", GREEN),
+    GROUP: ("springs", SKY),
+    CONTACT: ("contact", BLUE),
 }
 MOST_MODES = 12
 # Variables of modes that figures need.
@@ -252,8 +252,7 @@ def moved_supports(case: Case) -> tuple[list[int], str] | None:
         return None
     largest, direction = farthest(motion)
     moved = motion[:, signed("direction", direction)[0]]
-    together = np.isclose(moved, largest, rtol=1e-9, atol=0.0)
-    return np.flatnonzero(together).tolist(), direction
+    return np.flatnonzero(np.isclose(moved, largest, rtol=1e-9, atol=0.0)).tolist(), direction
 
 
 def total_reaction(
@@ -282,8 +281,7 @@ def total_reaction(
     _, sign = signed("direction", direction)
     axis = direction[-1]
     chosen = path["support_node"].isin(list(nodes)) & (path["support_axis"] == axis)
-    held = path["support_node"].values[chosen.values]
-    loose = sorted(set(nodes) - set(held.tolist()))
+    loose = sorted(set(nodes) - set(path["support_node"].values[chosen.values].tolist()))
     if loose:
         raise InputError(f"nodes: no support holds node {loose[0]} along {axis}")
     return sign * path["reaction"].values[:, chosen.values].sum(axis=1) + 0.0  # avoid -0
@@ -319,7 +317,13 @@ def parts_of(result: xr.Dataset) -> tuple[str, ...]:
 
 def strain_name(part: str) -> str:
     """Name of a strain energy in words."""
-    return STRAIN.get(part, part.removeprefix("strain_").replace("_", " "))
+    own = part.removeprefix("strain_").replace("_", " ")
+    return STRAIN.get(part, (own, ""))[0]
+
+
+def strain_color(part: str) -> str:
+    """Color of a part of the strain energy."""
+    return STRAIN.get(part, ("", GRAY))[1]
 
 
 def stacked(path: xr.Dataset) -> dict[str, NDArray[np.float64]]:

@@ -67,14 +67,12 @@ def plot_response_curve(
             keys.append(style.key(name, color=color))
     if not all(curve["stable"].values.all() for curve in labeled.values()):
         keys.append(style.key("unstable", color=style.GRAY, linestyle=UNSTABLE))
-    for name in (name for name in MARKERS if name in kept):
-        keys.append(style.key(name, **_mark(style.GRAY, name)))
+    keys += [style.key(name, **_mark(style.GRAY, name)) for name in MARKERS if name in kept]
     if backbone is not None and along == "frequency":
         _kind("backbone", backbone, "backbone", "mode")
-        size = _size_along(backbone, labeled)
         look = {"color": style.GRAY, "linewidth": 1.0, "label": "backbone", "zorder": 1.0}
         limits = axes.get_xlim(), axes.get_ylim()
-        keys += axes.plot(backbone["frequency"].values, size, **look)
+        keys += axes.plot(backbone["frequency"].values, _size_along(backbone, labeled), **look)
         axes.set(xlim=limits[0], ylim=limits[1])
     style.exponents(axes)
     return style.finish(figure, keys, 4, width=SIZE[0])
@@ -171,6 +169,5 @@ def _pieces(stable: NDArray[np.bool_], marked: NDArray[np.bool_]) -> list[tuple[
         return [(np.array([0]), bool(stable[0]))]
     # a bifurcation is neither stable nor unstable: the other end of the segment decides
     segment = np.where(marked[:-1], stable[1:], stable[:-1])
-    ends = np.flatnonzero(np.diff(segment)) + 1
-    edges = [0, *ends.tolist(), count - 1]
+    edges = [0, *(np.flatnonzero(np.diff(segment)) + 1).tolist(), count - 1]
     return [(np.arange(first, last + 1), bool(segment[first])) for first, last in pairwise(edges)]

@@ -272,8 +272,7 @@ def _frame(axes: Axes3D, middle: Points, box: Points, basis: Points) -> None:
         getattr(axis, "_axinfo", {}).get("grid", {}).update(color="#E2E2E2", linewidth=0.5)
     axes.tick_params(labelsize=style.NOTE, color=style.LIGHT, labelcolor=style.BLACK, pad=0)
     for name, pad in zip("xyz", _LABEL_PADS, strict=True):
-        label = getattr(axes, f"set_{name}label")
-        label(f"{name} (m)", **style.TEXT, labelpad=pad)
+        getattr(axes, f"set_{name}label")(f"{name} (m)", **style.TEXT, labelpad=pad)
 
 
 def _ticks(middle: Points, box: Points, basis: Points) -> list[NDArray]:
@@ -331,8 +330,7 @@ def piece_colors(
     vertices: Points, triangles: Indices, color: str | NDArray[np.float64] = PAPER
 ) -> NDArray[np.float64]:
     """Return the `shades` of the `pieces` of all triangles, shape (np, 3)."""
-    each = _divisions(len(triangles)) ** 2
-    return np.repeat(shades(vertices, triangles, color), each, axis=0)
+    return np.repeat(shades(vertices, triangles, color), _divisions(len(triangles)) ** 2, axis=0)
 
 
 def _divisions(count: int) -> int:

@@ -84,8 +84,7 @@ def split_edges(
             inner = line[low // each + 1 : -(-high // each)]
             ends = [between(line, cut / each) for cut in (low, high)]
             parts[int(row[low])].append(np.array([ends[0], *inner, ends[1]]))
-    visible, hidden = (_together(part) for part in parts)
-    return visible, hidden
+    return _together(parts[0]), _together(parts[1])
 
 
 def between(states: Points, place: float) -> Points:

@@ -110,8 +110,7 @@ def draw_structure(
     keys += [key for mark in shown for key in mark.keys]
 
     columns = style.columns_that_fit(keys, scene.WIDTH, _LEGEND_COLUMNS)
-    rows = -(-len(keys) // columns)
-    figure, axes = scene.view_figure(np.vstack(everything), sight, title, rows)
+    figure, axes = scene.view_figure(np.vstack(everything), sight, title, -(-len(keys) // columns))
     if displacement is not None:
         add_undeformed(axes, sheet)
     DrawnSheet(axes, sheet, points, sight, elements, loads)

@@ -41,17 +41,13 @@ DASHES = ("solid", (0, (6, 2)), (0, (2, 1.4)), (0, (7, 2, 1.5, 2)), (0, (4, 1.5)
 
 CREASE_DASHES = {"M": "solid", "V": (0, (5, 2)), "F": (0, (1, 1.5)), "U": (0, (5, 2, 1, 2))}
 ACTUATED = YELLOW
-SUPPORT = GREEN
+SUPPORT = SPRING = GREEN
 IMPOSED = ORANGE
 IMPOSED_TEXT = "#8A5A00"  # orange dark enough for text
 BASE = SKY
-SPRING = SUPPORT
-MASS = BLACK
+MASS = LINK = DASHPOT = GRAVITY = BLACK
 WARM = VERMILLION
-LINK = BLACK
 LOAD = PURPLE
-DASHPOT = BLACK
-GRAVITY = BLACK
 
 DPI = 150
 FAMILY = "DejaVu Sans"  # shipped with matplotlib: the same everywhere

@@ -62,33 +62,30 @@ def plot_sweep_map(
     """
     found = measured(sweep, measure, at)
     first, second = _two(sweep, x, y, at)
-    if is_grid(sweep):
+    grid = is_grid(sweep)
+    if grid:
         sweep_charts.check_left(found, (first, second))
     figure, axes = style.single((6.2, 4.4), title, label(sweep[first]), label(sweep[second]))
     axes.grid(False)
     across, down = _places(axes, sweep[first], "x"), _places(axes, sweep[second], "y")
-    if is_grid(sweep):
-        values = found.transpose(second, first).values
+    values = found.transpose(second, first).values if grid else found.values
+    sweep_charts.check_some(values, measure)
+    missing = ~np.isfinite(values)
+    if grid:
         mesh = np.ma.masked_invalid(values)
-        sweep_charts.check_some(values, measure)
         drawn = axes.pcolormesh(
             across, down, mesh, cmap=_SHADES, shading="nearest", rasterized=True
         )
         if min(values.shape) > 2 and np.ptp(mesh) > 0.0:
             lines = axes.contour(across, down, mesh, levels=6, colors=style.BLACK, linewidths=0.7)
             axes.clabel(lines, fontsize=style.NOTE, fmt=lambda value: f"{value:.4g}")
-        missing = np.argwhere(~np.isfinite(values))
-        axes.plot(across[missing[:, 1]], down[missing[:, 0]], **_FAILED)
+        across, down = np.meshgrid(across, down)
     else:
-        values = found.values
-        sweep_charts.check_some(values, measure)
-        there = np.isfinite(values)
-        look = {"c": values[there], "cmap": _SHADES, "s": 26.0, "edgecolors": style.GRAY}
-        drawn = axes.scatter(across[there], down[there], linewidths=0.5, **look)
-        missing = np.flatnonzero(~there)
-        axes.plot(across[missing], down[missing], **_FAILED)
+        look = {"c": values[~missing], "cmap": _SHADES, "s": 26.0, "edgecolors": style.GRAY}
+        drawn = axes.scatter(across[~missing], down[~missing], linewidths=0.5, **look)
+    axes.plot(across[missing], down[missing], **_FAILED)
     style.color_bar(figure, drawn, sweep_charts.named(found), ax=axes)
-    return style.finish(figure, [style.key("no value", **_FAILED)] if len(missing) else ())
+    return style.finish(figure, [style.key("no value", **_FAILED)] if missing.any() else ())
 
 
 def plot_sweep_lines(
@@ -129,8 +126,7 @@ def plot_sweep_lines(
         `sweep` is not a sweep, there is no such measure or parameter, no point has a value, or `at`
         does not name a further parameter of a grid.
     """
-    chart = sweep_charts.line_chart(sweep, measure, x, by, at)
-    return figure_of([chart], (6.2, 4.0), title)
+    return figure_of([sweep_charts.line_chart(sweep, measure, x, by, at)], (6.2, 4.0), title)
 
 
 def plot_main_effects(
@@ -158,12 +154,11 @@ def plot_main_effects(
     charts = sweep_charts.effect_charts(sweep, measure, at)
     columns = min(COLUMNS, len(charts))
     size = 0.6 + 2.8 * columns, 0.5 + 2.6 * -(-len(charts) // columns)
-    figure = figure_of(charts, size, title, columns, legend=0, sharey=True)
     keys = [
         style.key("mean over everything else", color=style.BLUE, marker="o", markersize=3.0),
         style.key("standard deviation", color=style.SKY, alpha=0.3, linewidth=6.0),
     ]
-    return style.finish(figure, keys)
+    return style.finish(figure_of(charts, size, title, columns, legend=0, sharey=True), keys)
 
 
 def plot_sobol_indices(indices: SobolIndices, title: str = "") -> Figure:

@@ -92,8 +92,7 @@ def plot_steps(
         Chart("time (s)", f"({unit})", [Curve(name, np.asarray(time), np.asarray(values))], name)
         for name, (time, values) in steps.items()
     ]
-    size = 7.5, 0.8 + 1.35 * len(steps)
-    return figure_of(charts, size, title, legend=0, sharex=True)
+    return figure_of(charts, (7.5, 0.8 + 1.35 * len(steps)), title, legend=0, sharex=True)
 
 
 def draw_overlay(

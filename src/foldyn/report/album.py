@@ -175,5 +175,4 @@ def crossing_panels(results: ByRule) -> list[Section]:
         "Panels that pass through each other, which nothing keeps them from, and where this was "
         f"seen first{more}"
     )
-    header = ["mass rule", "panel", "and panel", "sample", unit]
-    return [Table(header, rows[:MOST_PAIRS], caption)]
+    return [Table(["mass rule", "panel", "and panel", "sample", unit], rows[:MOST_PAIRS], caption)]

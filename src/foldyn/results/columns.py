@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import zlib
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -145,11 +146,9 @@ class Columns:
     def damaged(self) -> Path | None:
         """Return a file that does not hold the rows that were written; None if all do."""
         for name, wanted in self.sums.items():
-            try:
+            with suppress(OSError):  # missing or unreadable
                 if self._sum(name, self.count) == wanted:
                     continue
-            except OSError:  # missing or unreadable
-                pass
             return self._path(name)
         return None
 

@@ -43,8 +43,7 @@ class Crossings(NamedTuple):
         if not len(self.crossed):
             return result.assign_attrs(counts)
         found = {"crossing_panels": self.panels, "crossing_first": self.first}
-        named = variables(CROSSINGS, "crossing", found)
-        return result.assign(named).assign_attrs(counts)
+        return result.assign(variables(CROSSINGS, "crossing", found)).assign_attrs(counts)
 
     def text(self, when: str, samples: int) -> str:
         """Describe the crossings in words; empty if there are none.

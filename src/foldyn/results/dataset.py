@@ -180,9 +180,7 @@ def modes_dataset(
     if "between_position" in values:
         where, text = values["between_position"], "rest position of the points between nodes"
         data["between_position"] = variable(("between", "axis"), where, "m", text)
-    numbers = 1 + np.arange(len(np.asarray(values["frequency"])))
-    along = {"mode": ("mode", numbers, {"long_name": "mode"})}
-    return result_dataset("modes", case, data, along, statistics)
+    return result_dataset("modes", case, data, _numbered(values["frequency"]), statistics)
 
 
 def buckling_dataset(
@@ -211,9 +209,12 @@ def buckling_dataset(
     data["displacement"] = variable(PLACE, values["displacement"], "m", text)
     text = "displacement per unit of the load factor from the base state"
     data["prebuckling"] = variable(PLACE, values["prebuckling"], "m", text)
-    numbers = 1 + np.arange(len(np.asarray(values["load_factor"])))
-    along = {"mode": ("mode", numbers, {"long_name": "mode"})}
-    return result_dataset("buckling", case, data, along, statistics)
+    return result_dataset("buckling", case, data, _numbered(values["load_factor"]), statistics)
+
+
+def _numbered(modes: ArrayLike, text: str = "mode") -> dict[str, Any]:
+    """Coordinate of the numbers of modes, from 1."""
+    return {"mode": ("mode", 1 + np.arange(len(np.asarray(modes))), {"long_name": text})}
 
 
 def frf_dataset(
@@ -356,11 +357,8 @@ def fidelity_dataset(
         Facts about the comparison, each stored as an attribute.
     """
     data = variables(quantities.FIDELITY, (), values)
-    numbers = 1 + np.arange(len(np.asarray(values["frequency"])))
-    along = {
-        "mode": ("mode", numbers, {"long_name": "elastic mode of the reference"}),
-        "model": ("model", np.array(list(models)), {"long_name": "model"}),
-    }
+    along = _numbered(values["frequency"], "elastic mode of the reference")
+    along["model"] = ("model", np.array(list(models)), {"long_name": "model"})
     return result_dataset("fidelity", case, data, along, statistics)
 
 

@@ -82,8 +82,7 @@ def shapes_of(
         samples.
     """
     check_result(result, "result: ")
-    count = result.sizes[_along(result)[0]]
-    return _shapes(result, chosen_samples(count, every, frames), scale)
+    return _shapes(result, chosen_samples(result.sizes[_along(result)[0]], every, frames), scale)
 
 
 def _along(result: xr.Dataset) -> tuple[str, str, str, str]:

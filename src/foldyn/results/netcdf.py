@@ -28,14 +28,14 @@ import numpy as np
 import xarray as xr
 from xarray.backends import list_engines
 
-from foldyn.errors import FoldynError, InputError
+from foldyn.errors import FoldynError, InputError, within
 from foldyn.input_files import check_file, path_of
 from foldyn.results.attributes import FORMAT
 from foldyn.results.columns import PIECE, pieces
 from foldyn.results.contents import check_result, whole_attribute
 from foldyn.results.seal import seal, sound
 from foldyn.values import flag
-from foldyn.writing import whole
+from foldyn.writing import target_of, whole
 
 ENGINE = "h5netcdf"
 OTHERS = (
@@ -103,10 +103,8 @@ def load(path: str | os.PathLike[str], whole: bool = True) -> xr.Dataset:
     path, whole = path_of(path), flag("whole", whole)
     ds = read(path, "is not a Foldyn result (it cannot be read as NetCDF)", whole)
     check_result(ds, f"{path}: ")
-    try:
+    with within("", path):
         layout = whole_attribute(ds, "foldyn_format")
-    except InputError as error:
-        raise InputError(f"{path}: {error}") from None
     if layout != FORMAT:
         remedy = "update Foldyn" if layout > FORMAT else "compute it again"
         raise InputError(
@@ -158,9 +156,7 @@ def check_target(path: str | os.PathLike[str]) -> Path:
             f"{path}: only NetCDF is written; name the file {path.stem}.nc, or write it for other "
             "programs by fd.export"
         )
-    if not path.parent.is_dir():
-        raise InputError(f"{path}: the folder {path.parent} does not exist; make it first")
-    return path
+    return target_of(path)
 
 
 def fill(path: Path, write_to: Callable[[Sink], Any]) -> None:
@@ -313,8 +309,7 @@ def _split(ds: xr.Dataset) -> xr.Dataset:
 
 def _joined(ds: xr.Dataset) -> xr.Dataset:
     """Rejoin complex variables from their parts."""
-    names = dict.fromkeys(part.attrs.get(_WHOLE) for part in ds.data_vars.values())
-    for name in names:
+    for name in dict.fromkeys(part.attrs.get(_WHOLE) for part in ds.data_vars.values()):
         if name is None:
             continue
         real, imag = (ds[f"{name}_{part}"] for part in _PARTS)

@@ -13,8 +13,7 @@ _PIECE = 1 << 20
 def seal(path: Path) -> None:
     """Append a seal to a file."""
     with path.open("rb+") as file:
-        digest = hashlib.file_digest(file, "sha256").hexdigest()
-        file.write(_MARK + digest.encode() + b"\n")
+        file.write(_MARK + hashlib.file_digest(file, "sha256").hexdigest().encode() + b"\n")
 
 
 def sound(path: Path) -> bool | None:

@@ -255,9 +255,8 @@ def sides(
         creased, joined = _with_junctions(
             creased, joined, mesh, pattern, order[np.repeat(times > 2, times)], ends
         )
-    hinges = [
-        np.column_stack([part.axis, third[part.sides]]) for part in (creased, joined)
-    ]  # pieces of creases come first
+    # pieces of creases come first
+    hinges = [np.column_stack([part.axis, third[part.sides]]) for part in (creased, joined)]
     hinge, rotation = np.full((2, 3 * count), -1)
     weight, sign = np.zeros((2, 3 * count))
     numbers = np.arange(len(creased.sides) + len(joined.sides))
@@ -273,8 +272,7 @@ def sides(
     wings = []
     for k in stiff:
         hinge[k], weight[k] = len(numbers) + len(wings), 1.0
-        row = (a[k], b[k], third[k], n + len(wings))
-        hinges.append(np.array([row]))
+        hinges.append(np.array([(a[k], b[k], third[k], n + len(wings))]))
         wings.append(opposite(mesh.nodes[[a[k], b[k], third[k]]]))
     free = np.zeros(3 * count, bool)
     free[alone] = True

@@ -155,8 +155,7 @@ def _fitted(
         rows.append(np.repeat(3 * k + np.arange(3), len(own)))
         columns.append(np.tile(own, 3))
     place = np.concatenate(rows), np.concatenate(columns)
-    shape = 3 * len(points), len(middle)
-    return sparse.csr_array((np.concatenate(values), place), shape=shape)
+    return sparse.csr_array((np.concatenate(values), place), shape=(3 * len(points), len(middle)))
 
 
 def forces(strain: NDArray, stretching: NDArray) -> NDArray[np.float64]:

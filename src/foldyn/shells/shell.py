@@ -169,19 +169,17 @@ class Shell(Discretized):
         turned, hidden = handed_over(self.model, self.model.per_reach * hidden)
         turning[: len(turned)] += turned
         rows = np.where(hinges < len(self.nodes), hinges, -1)
-        points = np.concatenate([self.nodes, self.sides.wings])
         parts = (
             *parts,
-            moments(points[hinges], rows, turning),
+            moments(np.concatenate([self.nodes, self.sides.wings])[hinges], rows, turning),
             pushes(self.nodes.size + np.arange(self.rotations), hidden),
         )
         # the last angle of a side gives it the whole rotation
         last = np.append(side[1:] != side[:-1], True)
-        free = np.where(last, rotated.ravel()[side] / share, 0.0)
         return Swelling(
             np.zeros(len(self.folds)),
             joined((part, 0) for part in parts),
-            (stretched, free),
+            (stretched, np.where(last, rotated.ravel()[side] / share, 0.0)),
             (pushed, moment),
         )
 
@@ -272,8 +270,7 @@ class Shell(Discretized):
     @cached_property
     def stress_points(self) -> StressPoints:
         """Points of the panels at which stresses are found."""
-        radius = self.graded.radius if self.graded else 0.0
-        return StressPoints.of(self.pattern, self.sheet, radius)
+        return StressPoints.of(self.pattern, self.sheet, self.graded.radius if self.graded else 0.0)
 
     @cached_property
     def _recoveries(self) -> Recovery:

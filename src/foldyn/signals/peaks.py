@@ -164,9 +164,8 @@ class Curve(NamedTuple):
         a, b, c, center = self.stiffness_parabola(index)
         at = (self.f[near] / center) ** 2 - 1.0
         own = (self.size[index] / self.size[near]) ** 2 * (1.0 + at) ** self.order
-        shape = np.stack(
-            [np.roll(at, -k) for k in range(3)]
-        )  # in each row, the place of one sample, then the places of the others
+        # in each row, the place of one sample, then the places of the others
+        shape = np.stack([np.roll(at, -k) for k in range(3)])
         one, other = v - shape[:, 1], v - shape[:, 2]
         scale = (shape[:, 0] - shape[:, 1]) * (shape[:, 0] - shape[:, 2])
         part, slope = one * other / scale, (one + other) / scale  # L_i and L_i'

@@ -175,8 +175,7 @@ def _windows(x: NDArray[np.float64], span: int) -> tuple[NDArray, NDArray]:
         windows = np.lib.stride_tricks.sliding_window_view(channel, span + 1)
         for start in range(0, len(windows), _ROWS):
             # in blocks, to limit memory
-            block = np.vstack([triangle, windows[start : start + _ROWS]])
-            triangle = np.linalg.qr(block, mode="r")
+            triangle = np.linalg.qr(np.vstack([triangle, windows[start : start + _ROWS]]), mode="r")
     _, values, vectors = np.linalg.svd(triangle, full_matrices=False)
     return values, vectors
 

@@ -125,8 +125,7 @@ def subtract_final(x: ArrayLike, part: float = 0.1) -> NDArray[np.float64]:
         Fraction of the record, at its end, over which the final position is averaged.
     """
     values = records.checked_record("x", x, _FEWEST)
-    share = number("part", part, above=0.0, below=1.0)
-    count = max(1, round(share * values.size))
+    count = max(1, round(number("part", part, above=0.0, below=1.0) * values.size))
     return values - values[-count:].mean()
 
 

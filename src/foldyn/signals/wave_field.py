@@ -168,8 +168,7 @@ def pulse(time: ArrayLike, values: ArrayLike, *, sign: int = 1, share: float = 0
     arrival, height, width = found.reshape(-1, 3).T
     come = np.flatnonzero(np.isfinite(arrival))
     slope = theilslopes(arrival[come], come)[0] if len(come) > 2 else np.nan
-    speed = 1.0 / slope if slope else np.nan
-    return Pulse(arrival, sign * height, width, float(speed))
+    return Pulse(arrival, sign * height, width, float(1.0 / slope if slope else np.nan))
 
 
 def _first_peak(time: NDArray, values: NDArray, share: float) -> tuple[float, float, float]:

@@ -52,8 +52,7 @@ def ply_factors(
             continue
         along = turned_strain(angle + np.radians(ply.angle))
         for z in (low, high):
-            there = strain + z * curvature
-            stress = np.einsum("ab,bcp,...pc->...pa", ply.fibers, along, there)
+            stress = np.einsum("ab,bcp,...pc->...pa", ply.fibers, along, strain + z * curvature)
             own = (_tsai_wu if criterion == TSAI_WU else _maximum_stress)(stress, *ply.strength)
             least = np.minimum(least, own)
     return least

@@ -240,9 +240,7 @@ class PlateResultants:
         structure, pattern = self._structure, self._pattern
         rigid = set(rigid_panels(structure.options.rigid, len(pattern.faces)))
         straight = straight_creases(structure.nodes, structure.folds, pattern, structure.sheet)
-        condition = {}
-        for edge, k in edge_lookup(pattern.creases).items():
-            condition[edge] = CREASED if straight[k] else FREE
+        condition = {e: CREASED for e, k in edge_lookup(pattern.creases).items() if straight[k]}
         condition |= dict.fromkeys(structure.options.straight, STRAIGHT)
         condition |= {(low, high): CREASED for low, high, _ in structure.options.guided}
         condition |= dict.fromkeys(structure.options.clamped, CLAMPED)
@@ -306,8 +304,7 @@ def _map(panel: CondensedPanel, conditions: Sequence[int], rise: NDArray) -> NDA
         push[k, corners + where[k]] = 1.0
         if clamped[k]:
             given[k, corners + count + where[k]] = 1.0
-    known = (what == VERTEX) | still | clamped
-    free = np.flatnonzero(~known)
+    free = np.flatnonzero(~((what == VERTEX) | still | clamped))
     right = push[free] - panel.stiffness[free] @ given
     level = np.zeros((len(rise), inputs))
     level[:, inputs - len(rise) :] = 1.0
@@ -336,8 +333,7 @@ def _moved(rest: NDArray, x: NDArray, kind: _Kind) -> tuple[NDArray, NDArray]:
     before, after = (place[nodes] - place[kind.nodes].mean(axis=1)[:, None] for place in (rest, x))
     both = np.einsum("pki,pkj->pij", before[:, :corners], after[:, :corners])
     left, _, right = np.linalg.svd(both)
-    sign = np.sign(np.linalg.det(left @ right))
-    left[:, :, 2] *= sign[:, None]
+    left[:, :, 2] *= np.sign(np.linalg.det(left @ right))[:, None]
     rotation = np.swapaxes(left @ right, 1, 2)  # from rest to now
     local = np.einsum("pki,pij->pkj", after, rotation) - before
     local = np.einsum("pad,pkd->pka", kind.frames, local)
@@ -345,8 +341,7 @@ def _moved(rest: NDArray, x: NDArray, kind: _Kind) -> tuple[NDArray, NDArray]:
     angle = Rotation.from_matrix(rotation).as_rotvec()
     along = np.roll(before[:, :corners], -1, axis=1) - before[:, :corners]
     along /= np.linalg.norm(along, axis=2)[:, :, None]
-    turned = -np.einsum("pi,pki->pk", angle, along)
-    return local, turned
+    return local, -np.einsum("pi,pki->pk", angle, along)
 
 
 def _stretched(rest: NDArray, after: NDArray, corners: int) -> NDArray[np.float64]:

@@ -56,9 +56,8 @@ def _listed(result: xr.Dataset, name: str, otherwise: list[Any]) -> list[Any]:
 
 def points(result: xr.Dataset) -> NDArray[np.int64]:
     """Numbers of the points shown on a page."""
-    count = result.sizes["point"]
     every = -(-2 * result["coefficient"].size // MOST_NUMBERS)
-    kept = np.arange(count) % every == 0
+    kept = np.arange(result.sizes["point"]) % every == 0
     if "branch" in result:
         ends = np.flatnonzero(np.diff(result["branch"].values))
         kept[ends] = kept[ends + 1] = True

@@ -106,9 +106,7 @@ def catches(case: Case) -> list[list[int]]:
 
 def load_arrows(case: Case) -> list[list[Any]]:
     """Nodal forces, divided by the largest: [[7, [1.0, 0.0, 0.0]], ...]; without gravity."""
-    forces = np.zeros_like(case.structure.nodes)
-    for vectors, _ in case.force_terms:
-        forces += vectors
+    forces = sum((force for force, _ in case.force_terms), np.zeros_like(case.structure.nodes))
     size = np.linalg.norm(forces, axis=1)
     relative = (forces / (size.max(initial=0.0) or 1.0)).round(4)
     return [[int(node), relative[node].tolist()] for node in np.flatnonzero(size)]

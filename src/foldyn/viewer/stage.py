@@ -182,8 +182,7 @@ def _folding(one: _Shown) -> Iterator[dict[str, Any]]:
     result, u = one.result, displacements(one.result, "step")
     own_fields = folding_fields(one.case, u, result["fold_angle"].values)
     about = _changing(one, result, u, way(result), own_fields)
-    load = one.arrays.exact(f"{one.key}.load", result["share"].values, "f4")
-    yield about | {"load": load}
+    yield about | {"load": one.arrays.exact(f"{one.key}.load", result["share"].values, "f4")}
 
 
 def _changing(
@@ -237,10 +236,9 @@ def _modes(one: _Shown) -> Iterator[dict[str, Any]]:
 def _response(one: _Shown) -> Iterator[dict[str, Any]]:
     values = one.result[quantity_of(one.result)].transpose("frequency", "node", "axis").values
     both = np.stack([np.real(values), np.imag(values)], axis=1)
-    frequency = one.result["frequency"].values
     yield {
         "displacement": one.arrays.changing(f"{one.key}.u", both, OF_LARGEST / 1000),
-        "moments": one.arrays.exact(f"{one.key}.t", frequency, "f4"),
+        "moments": one.arrays.exact(f"{one.key}.t", one.result["frequency"].values, "f4"),
     }
 
 
@@ -250,13 +248,6 @@ _LISTED: Mapping[str, Callable[[_Shown], Iterable[dict[str, Any]]]] = {
     "periodic": lambda one: [orbits(one.arrays, one.key, one.result)],
 }  # fmt: skip
 """Function for each kind of result that describes it once, or once for each mode."""
-
-
-def _moved(kind: str, result: xr.Dataset) -> str:
-    """Name of the variable that describes how nodes move."""
-    if kind == "response":
-        return quantity_of(result)
-    return "coefficient" if kind == "periodic" else "displacement"
 
 
 def _more(
@@ -269,7 +260,8 @@ def _more(
         structure = next(iter(cases.values())).structure
         return about_waves(next(iter(results.values())), len(structure.triangles))
     first = next(iter(results.values()))
-    name = _moved(kind, first)
+    usual = "coefficient" if kind == "periodic" else "displacement"
+    name = quantity_of(first) if kind == "response" else usual
     moved = [
         np.abs(result[name].sel(node=nodes[:1] or [0]).transpose(..., "axis").values)
         for result in results.values()

@@ -227,8 +227,7 @@ def fields(case: Case, result: xr.Dataset, displacement: NDArray) -> dict[str, F
     """
     structure, out = case.structure, {}
     if CONTACT_FORCE in result:
-        touch = result[CONTACT_FORCE].values
-        out["contact"] = Field("force of contact", "N", "node", touch, False)
+        out["contact"] = Field("force of contact", "N", "node", result[CONTACT_FORCE].values, False)
     if isinstance(structure, Structure):
         out["bar_strain"] = _strain_field(bar_strain(structure, displacement))
     if structure.linear or not creases_known(case, result):
@@ -237,8 +236,7 @@ def fields(case: Case, result: xr.Dataset, displacement: NDArray) -> dict[str, F
         found = states(case, result, displacement)
     except ComputationError:  # a motion that has diverged: its panels no longer reach equilibrium
         return out
-    turn = np.degrees(found.turn)
-    out["turn"] = Field("turn of creases from rest", "°", "crease", turn, True)
+    out["turn"] = Field("turn of creases from rest", "°", "crease", np.degrees(found.turn), True)
     if not memory_acts(case, result):
         out["fold_moment"] = Field("moment of creases", "N m", "crease", found.moment, True)
         density = energy_density(structure, displacement, found)

@@ -69,8 +69,7 @@ def _beside(
 def _shapes(one: Shapes, result: xr.Dataset, case: Case) -> list[Chart]:
     """Charts of measured and computed shapes, one for each load factor."""
     model, (across, up) = one.modelled(result, case), picture_plane(one, case)
-    letters = [AXES.index(axis) for axis in one.axes]
-    rest = case.structure.nodes[one.where(case)][:, letters]
+    rest = case.structure.nodes[one.where(case)][:, [AXES.index(axis) for axis in one.axes]]
     origin = rest if one.quantity == "displacement" else 0.0
     labels = f"{one.axes[across]} (m)", f"{one.axes[up]} (m)"
     steps = np.linspace(0, len(one.load_factor) - 1, min(MOST, len(one.load_factor))).astype(int)
@@ -103,8 +102,7 @@ def _responses(one: FrequencyResponse, result: xr.Dataset, case: Case) -> list[C
     if not one.magnitude:
         phase = np.degrees(np.angle(model))
         # avoids jumps by 360 degrees
-        near = phase + np.degrees(np.angle(one.values * model.conj()))
-        parts.append((phase, near))
+        parts.append((phase, phase + np.degrees(np.angle(one.values * model.conj()))))
     return [
         Chart(
             "frequency (Hz)",

@@ -31,8 +31,7 @@ def plot_measured(one: Measurement, result: xr.Dataset, case: Case, note: str = 
     width = WIDTH if columns > 1 else 6.0
     height = 0.8 * width / columns if square else 2.4
     title = ", ".join([*([note] if note else []), *(["held out"] if one.held_out else [])])
-    size = width, 0.8 + height * -(-len(charts) // columns)
-    figure = figure_of(charts, size, title, columns)
+    figure = figure_of(charts, (width, 0.8 + height * -(-len(charts) // columns)), title, columns)
     if not isinstance(one, Shapes):
         return figure
     place = {node: k for k, node in enumerate(one.where(case).tolist())}

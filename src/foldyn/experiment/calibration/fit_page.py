@@ -66,9 +66,8 @@ def write_fit(
             "Correlation of the parameters: where it is near 1 or -1, the data hardly tell two of "
             "them apart, and their intervals are long in one direction."
         )
-        table = _correlation(fit, caption)
         draw = partial(_draw, "plot_correlation", fit, note)
-        sections += album.figure("correlation", caption, draw, table)
+        sections += album.figure("correlation", caption, draw, _correlation(fit, caption))
     if not all(one.determined for one in fit.estimates):
         sections.append(Text(_blind(fit)))
     sections += [Heading("Measured and model"), _scores(fit)]
@@ -104,10 +103,9 @@ def _stages(fit: Fit, runs: Sequence[_Run], title: str) -> Iterator[Stage]:
     """Stages of the fitted model: one with all paths in step, one with all motions in step."""
     for kind in dict.fromkeys(run.case_file.analysis.kind for run in runs):
         own = {run.name: run for run in runs if run.case_file.analysis.kind == kind}
-        nodes = _nodes(fit, own.values())
         results = {name: run.result for name, run in own.items()}
         cases = {name: run.case_file.case() for name, run in own.items()}
-        yield stage(results, cases, title, nodes)
+        yield stage(results, cases, title, _nodes(fit, own.values()))
 
 
 def _nodes(fit: Fit, runs: Iterable[_Run]) -> list[int]:
@@ -129,8 +127,7 @@ def _provenance(fit: Fit, runs: Sequence[_Run], call: Call) -> list[Section]:
         sections.append(
             inputs_table(inputs(run.case_file, case, {run.case_file.masses[0]: run.result}))
         )
-    results = {run.name: run.result for run in runs}
-    sections.append(inputs_table(computed(results, call)))
+    sections.append(inputs_table(computed({run.name: run.result for run in runs}, call)))
     for path in dict.fromkeys([fit.problem.path, *(run.case_file.path for run in runs)]):
         sections.append(Listing(f"The case file {path.name}", path.read_text("utf-8")))
     return sections

@@ -247,8 +247,7 @@ class Problem:
             remedy = f"analysis.dt below {longest:.3g} s"
             half = self._changed(steps)
             quarters = {k: {key: 0.5 * x for key, x in one.items()} for k, one in steps.items()}
-            quarter = self._changed(quarters)
-            found.append(Finer("time step", remedy, min(orders), half, quarter, 4))
+            found.append(Finer("time step", remedy, min(orders), half, self._changed(quarters), 4))
         if meshes:
             most = max(one["model.divisions"] for one in meshes.values())
             remedy, half = f"model.divisions = {most:g}", self._changed(meshes)

@@ -22,7 +22,7 @@ from foldyn.errors import InputError
 from foldyn.experiment.calibration.fit_problem import Problem
 from foldyn.experiment.calibration.measurement import Measurement, spread
 from foldyn.results import netcdf
-from foldyn.writing import plain, write_json, write_text
+from foldyn.writing import plain, target_of, write_json, write_text
 
 # Singular value, relative to the largest, below which a direction is not determined at all.
 WEAK = 1e-5
@@ -157,16 +157,14 @@ class Uncertainty:
         seen = own & (singular > WEAK * singular[0])
         with np.errstate(divide="ignore", invalid="ignore"):
             seen &= ~(misfit / singular > 1.0)
-        weak = np.sqrt((rows[own & ~seen] ** 2).sum(axis=0))
-        determined = weak < PART
+        determined = np.sqrt((rows[own & ~seen] ** 2).sum(axis=0)) < PART
         inverse = rows[seen].T / singular[seen] ** 2 @ rows[seen]
         cov = inverse * misfit**2
         influence = -scale[:, None] * (inverse @ jacobian.T)
         error = np.where(determined, np.sqrt(np.diag(cov)) * scale, np.inf)
         error[at_bound] = np.nan
-        usable = determined & ~at_bound
         correlation = np.full((p, p), np.nan)
-        some = np.flatnonzero(usable)
+        some = np.flatnonzero(determined & ~at_bound)
         root = np.sqrt(np.diag(cov))[some]
         with np.errstate(divide="ignore", invalid="ignore"):
             correlation[np.ix_(some, some)] = cov[np.ix_(some, some)] / np.outer(root, root)
@@ -412,9 +410,7 @@ class Fit:
         InputError
             The file's name has another ending, or its folder does not exist.
         """
-        path = Path(path)
-        if not path.parent.is_dir():
-            raise InputError(f"{path}: the folder {path.parent} does not exist; make it first")
+        path = target_of(path)
         if path.suffix == ".json":
             write_json(self.summary(), path)
         elif path.suffix == ".nc":

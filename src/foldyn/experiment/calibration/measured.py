@@ -103,8 +103,7 @@ class ForceDisplacement(AtNodes):
         """Predictions of the measured values, in the order of `observed`."""
         nodes = np.isin(result["support_node"].values, self.where(case))
         chosen = nodes & (result["support_axis"].values == self.axis)
-        total = result["reaction"].values[:, chosen].sum(axis=1)
-        return total[_steps(result, self.factors(case))]
+        return result["reaction"].values[:, chosen].sum(axis=1)[_steps(result, self.factors(case))]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -188,8 +187,7 @@ class Measured(Measurement):
                 self._of("measure"),
             )
         factors = column(self._of("load_factor"), self.load_factor)
-        values = column(self._of("values"), self.values, len(factors))
-        self._set(load_factor=factors, values=values)
+        self._set(load_factor=factors, values=column(self._of("values"), self.values, len(factors)))
 
     @property
     def asked(self) -> Asked:

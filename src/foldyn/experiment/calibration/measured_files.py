@@ -266,8 +266,7 @@ def _table(file: Path, names: Sequence[str]) -> xr.DataArray:
     values = np.full((len(table[headings[0]]), len(nodes), len(AXES)), np.nan)
     for heading, (node, axis) in zip(headings, columns, strict=True):
         values[:, nodes.index(node), AXES.index(axis)] = table[heading]
-    axes = {"node": nodes, "axis": list(AXES)}
-    return xr.DataArray(values, axes, ("photo", "node", "axis"))
+    return xr.DataArray(values, {"node": nodes, "axis": list(AXES)}, ("photo", "node", "axis"))
 
 
 def _of_nodes(file: Path, moved: xr.DataArray, nodes: Sequence[int]) -> xr.DataArray:

@@ -85,8 +85,7 @@ class ModeShapes(NodeValues):
                     f"{self._of('values')}: mode {number} has {len(known)} components that are "
                     f"numbers; a shape needs at least {FEWEST}, not all of them 0"
                 )
-        largest = np.nanmax(np.abs(values), axis=(1, 2))
-        self._set(values=values / largest[:, None, None])
+        self._set(values=values / np.nanmax(np.abs(values), axis=(1, 2))[:, None, None])
 
     @property
     def absorbed(self) -> int:
@@ -385,8 +384,7 @@ class FrequencyResponse(NodeValues):
         if frequency[0] < 0.0 or (np.diff(frequency) <= 0.0).any():
             raise InputError(f"{self._of('frequency')}: must increase from 0 Hz or more; sort it")
         values = plain_array(self._of("values"), self.values)
-        wanted = "fiu" if self.magnitude else "c"
-        if values.dtype.kind not in wanted:
+        if values.dtype.kind not in ("fiu" if self.magnitude else "c"):
             what = "magnitudes are real numbers" if self.magnitude else "must be complex numbers"
             other = "leave out magnitude" if self.magnitude else "for magnitudes: magnitude = true"
             raise InputError(f"{self._of('values')}: got {values.dtype}: {what} ({other})")

@@ -91,8 +91,7 @@ class Paper:
             middle = points.mean(axis=(0, 1))
             axes = np.linalg.svd((points - middle).reshape(-1, 3), full_matrices=False)[2]
             flat[own] = (points - middle) @ axes[:2].T + rng.uniform(0.0, 1.0, 2)
-        marked = triangles < len(pattern.vertices)
-        return cls(triangles, flat, marked, two_colors(pattern)[panels])
+        return cls(triangles, flat, triangles < len(pattern.vertices), two_colors(pattern)[panels])
 
 
 def two_colors(pattern: Pattern) -> NDArray[np.bool_]:
@@ -163,8 +162,7 @@ class Sensor(Checked):
     @cached_property
     def moments(self) -> NDArray[np.float64]:
         """Times of the rays, from -1/2 to 1/2 of the exposure, shape (samples,)."""
-        rank = np.argsort(np.argsort(_halton(self.samples)[:, 1]))
-        return (rank + 0.5) / self.samples - 0.5
+        return (np.argsort(np.argsort(_halton(self.samples)[:, 1])) + 0.5) / self.samples - 0.5
 
 
 def _halton(count: int) -> NDArray[np.float64]:
@@ -189,8 +187,7 @@ class Studio:
     def of(cls, structure, camera: Camera, look: Look, sensor: Sensor, seed: int) -> Studio:
         """Draw paper and grain at random; equal seeds give equal paper."""
         rng = np.random.default_rng([seed, 0])
-        paper = Paper.of(structure, rng)
-        return cls(camera, look, sensor, paper, grain_tile(look, rng))
+        return cls(camera, look, sensor, Paper.of(structure, rng), grain_tile(look, rng))
 
     @cached_property
     def _falloff(self) -> NDArray[np.float32]:
@@ -276,9 +273,8 @@ def _unhidden(
     """Nodes in the image that no panel hides by more than a hundredth of the distance."""
     height, width = depth.shape
     at = np.rint(pixels).astype(np.int64)
-    inside = ((at >= 1) & (at < [width - 1, height - 1])).all(axis=1)
     seen = np.zeros(len(at), dtype=bool)
-    for node in np.flatnonzero(inside):
+    for node in np.flatnonzero(((at >= 1) & (at < [width - 1, height - 1])).all(axis=1)):
         u, v = at[node]
         around = depth[v - 1 : v + 2, u - 1 : u + 2]
         # some of the nine pixels around a node show one of its own panels, not one in front

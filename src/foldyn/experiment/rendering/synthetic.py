@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
@@ -19,6 +18,7 @@ from foldyn.experiment.camera import Camera, opencv
 from foldyn.experiment.rendering.picture import Look, Sensor, Studio
 from foldyn.results import case_of
 from foldyn.values import number
+from foldyn.writing import target_of
 
 # Codec by the file's suffix: FFV1 is lossless, mp4v is lossy.
 CODECS = {".mkv": "FFV1", ".avi": "FFV1", ".mp4": "mp4v"}
@@ -84,16 +84,14 @@ class SyntheticFilm:
         seen = np.zeros((len(self.time), count), dtype=bool)
         for k, one in self._seen.items():
             seen[k] = one
-        dropped = np.isin(np.arange(len(self.time)), self.dropped)
         data = {
             "position": (("time", "node", "axis"), positions, {"units": "m"}),
             "position_px": (("time", "node", "uv"), self.studio.camera.project(positions)),
             "seen": (("time", "node"), seen),
-            "dropped": (("time",), dropped),
+            "dropped": (("time",), np.isin(np.arange(len(self.time)), self.dropped)),
         }
-        time = ("time", self.time, {"units": "s"})
         names = {"node": np.arange(count), "axis": ["x", "y", "z"], "uv": ["u", "v"]}
-        return xr.Dataset(data, {"time": time, **names})
+        return xr.Dataset(data, {"time": ("time", self.time, {"units": "s"}), **names})
 
 
 def film_of(
@@ -183,10 +181,9 @@ def photos_of(
     truth : xarray.Dataset
         `position`, `position_px` and `seen` along the dimension `photo`.
     """
-    structure = case_of(path).structure
     states = path["rest_position"].values + path["displacement"].values[list(steps)]
     sensor = replace(sensor or Sensor(), exposure=0.0)
-    studio = Studio.of(structure, camera, look or Look(), sensor, seed)
+    studio = Studio.of(case_of(path).structure, camera, look or Look(), sensor, seed)
 
     def positions(times: NDArray[np.float64]) -> NDArray[np.float64]:
         return states[np.rint(times).astype(int)]
@@ -207,11 +204,9 @@ def write_film(film: SyntheticFilm, path: str | os.PathLike[str]) -> None:
         OpenCV's build lacks the codec.
     """
     cv2 = opencv()
-    path = Path(path)
+    path = target_of(path)
     if path.suffix not in CODECS:
         raise InputError(f"{path}: films are written to {', '.join(CODECS)}")
-    if not path.parent.is_dir():
-        raise InputError(f"{path}: the folder {path.parent} does not exist; make it first")
     codec = cv2.VideoWriter_fourcc(*CODECS[path.suffix])
     writer = cv2.VideoWriter(str(path), codec, film.rate, film.studio.camera.size, isColor=False)
     if not writer.isOpened():

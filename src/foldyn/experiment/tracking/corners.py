@@ -97,11 +97,10 @@ def find_corners(
     settings = settings or CornerSettings()
     reach = settings.reach_in(image.shape)
     spacing = settings.spacing or 1.5 * reach
-    block = int(np.clip(round(0.3 * reach), 3, 9)) | 1
     smooth = cv2.GaussianBlur(image, (0, 0), max(0.8, 0.06 * reach))
     candidates = cv2.goodFeaturesToTrack(
         smooth, _CANDIDATES * settings.most, settings.quality, 0.2 * reach,
-        blockSize=block, useHarrisDetector=True, k=0.05,
+        blockSize=int(np.clip(round(0.3 * reach), 3, 9)) | 1, useHarrisDetector=True, k=0.05,
     )  # fmt: skip
     if candidates is None or not len(candidates):
         raise InputError(f"{place}: no corners found; take a sharp, well lit one, or another --roi")
@@ -123,8 +122,7 @@ def _first_of_each(points: NDArray[np.float64], apart: float) -> NDArray[np.bool
     """Points that have no earlier point within a distance."""
     kept = np.zeros(len(points), dtype=bool)
     for k, point in enumerate(points):
-        distance = np.hypot(*(points[kept] - point).T)
-        kept[k] = not (distance < apart).any()
+        kept[k] = not (np.hypot(*(points[kept] - point).T) < apart).any()
     return kept
 
 
@@ -185,10 +183,8 @@ def _refine_all(image: Any, start: Any, reach: float, moved: float, found: Any) 
             width = max(2.0, (0.32 if turn == 0 else 0.2) * reach)
             du, dv, error, count = _meet(image, u, v, inner, reach, width)
             u, v = u + du, v + dv
-            if count < 2 or np.hypot(u - start[p, 0], v - start[p, 1]) > moved:
-                count = 0
-                break
-            if not _inside(image, u, v, reach):
+            strayed = np.hypot(u - start[p, 0], v - start[p, 1]) > moved
+            if count < 2 or strayed or not _inside(image, u, v, reach):
                 count = 0
                 break
         if count >= 2:
@@ -295,8 +291,7 @@ def _intersection(lines: Any) -> tuple[float, float, float, int]:
         misfit = np.sum(weight * left**2) / max(count - 2, 1)
         error = np.sqrt(max(misfit, 1.0) * (1.0 / (half - turn) + 1.0 / (half + turn)))
         worst = int(np.argmax(np.sqrt(weight) * np.abs(left)))
-        allowed = max(4.0 * max(lines[worst, 3], 0.02), 0.15)
-        if count < 3 or np.abs(left[worst]) < allowed:
+        if count < 3 or np.abs(left[worst]) < max(4.0 * max(lines[worst, 3], 0.02), 0.15):
             break
         weight[worst] = 0.0
     return x, y, error, count

@@ -238,17 +238,15 @@ class _State:
     @classmethod
     def begun(cls, here: Array, kept: NDArray[np.bool_]) -> _State:
         count = len(here)
-        misses = np.where(kept, 0, _MOST_MISSES + 1)
         anchor = np.repeat(_only(kept, here)[np.newaxis], count, axis=0)
         anchor[np.arange(count), np.arange(count)] = here
-        return cls(here, np.zeros((count, 2)), misses, anchor)
+        return cls(here, np.zeros((count, 2)), np.where(kept, 0, _MOST_MISSES + 1), anchor)
 
     def moved(self, here: Array, kept: NDArray[np.bool_]) -> _State:
-        misses = np.where(kept, 0, self.misses + 1)
         step = np.where(kept[:, np.newaxis], here - self.here, self.step)
         anchor = self.anchor.copy()
         anchor[kept] = _only(kept, here)
-        return _State(here, step, misses, anchor)
+        return _State(here, step, np.where(kept, 0, self.misses + 1), anchor)
 
 
 def _advance(
@@ -328,8 +326,7 @@ def _flow(last, frame, start, guess, led, reach, settings: FollowSettings):
 
 def _within(points, shape, margin):
     height, width = shape
-    inside = (points >= margin) & (points <= np.array([width, height]) - 1.0 - margin)
-    return inside.all(axis=1)
+    return ((points >= margin) & (points <= np.array([width, height]) - 1.0 - margin)).all(axis=1)
 
 
 def _by_neighbors(state: _State, place: Array, good: NDArray[np.bool_]) -> tuple[Array, Array]:

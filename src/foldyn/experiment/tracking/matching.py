@@ -200,8 +200,7 @@ def _scales(uv: Array, seen: Array, placing: Placing) -> Array:
 def _most_votes(uv: Array, flat: Array, tolerance: float) -> Array:
     """Shift that puts most nodes on points; every pair of node and point votes for its shift."""
     votes = (uv[:, np.newaxis] - flat).reshape(-1, 2)
-    low = votes.min(axis=0)
-    cell = np.floor((votes - low) / tolerance).astype(np.int64)
+    cell = np.floor((votes - votes.min(axis=0)) / tolerance).astype(np.int64)
     width = cell[:, 0].max() + 2
     table = np.bincount(cell[:, 1] * width + cell[:, 0], minlength=width * (cell[:, 1].max() + 2))
     table = np.pad(table, (0, -len(table) % width)).reshape(-1, width)
@@ -291,11 +290,9 @@ def _looked_up(
 ) -> Array:
     """Positions of requested nodes, found where edges meet near their neighbors' prediction."""
     kept = _without_strays(place, flat, asked)
-    expected = by_model(kept, flat, asked)
-    missing = np.where(np.isfinite(kept), np.nan, expected)
+    missing = np.where(np.isfinite(kept), np.nan, by_model(kept, flat, asked))
     junctions = refine(image, missing, reach=reach, moved=0.6 * reach)
-    sure = np.isfinite(junctions.position[:, 0]) & (junctions.error < 0.5)
-    for node in np.flatnonzero(sure):
+    for node in np.flatnonzero(np.isfinite(junctions.position[:, 0]) & (junctions.error < 0.5)):
         apart = np.hypot(*(kept - junctions.position[node]).T)
         if not (apart < 0.5 * reach).any():  # otherwise the corner belongs to another node
             kept[node] = junctions.position[node]

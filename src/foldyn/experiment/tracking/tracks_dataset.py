@@ -93,8 +93,7 @@ def add_displacements(
     seen[:, node[point]] = ds["position_px"].values[:, point] - origin
     view = matches[0].view  # the camera stands still: one view serves all photographs
     depth = np.stack([view.depth(one.positions[:vertices]) for one in matches])
-    places = view.back(seen, depth)
-    moved = places - model.rest[:vertices]
+    moved = view.back(seen, depth) - model.rest[:vertices]
     moved[..., int(np.argmax(np.abs(axes_of_view(placing.up, placing.facing)[2])))] = np.nan
     measured = np.isfinite(seen[..., 0])
     out = ds.assign(
@@ -115,8 +114,7 @@ def add_displacements(
     shown = projected[0] if along == "time" else projected
     out["projected_px"] = (dims, shown, {"units": "pixel"})
     if along == "time":
-        away = depth[0] - view.depth(view.camera())
-        out["camera_depth"] = (("node",), away, {"units": "m"})
+        out["camera_depth"] = (("node",), depth[0] - view.depth(view.camera()), {"units": "m"})
     out.attrs |= {
         "metres_per_pixel": float(view.metres_per_pixel),
         "camera_position": view.camera(),

@@ -124,8 +124,7 @@ def filled(tracks: xr.Dataset) -> NDArray[np.float64]:
     far = sparse.diags_array(near.sum(axis=1) + 1e-9) - near  # nodes without neighbors stay at rest
     lost = np.flatnonzero(~seen)
     flat = out.transpose(1, 0, 2).reshape(len(seen), -1)
-    pull = near[lost] @ flat
-    flat[lost] = splu(far[lost][:, lost].tocsc()).solve(pull)
+    flat[lost] = splu(far[lost][:, lost].tocsc()).solve(near[lost] @ flat)
     return flat.reshape(len(seen), len(moved), 3).transpose(1, 0, 2)
 
 

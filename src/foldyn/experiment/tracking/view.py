@@ -54,8 +54,7 @@ class TrackedModel:
             rest = np.asarray(structure.nodes, dtype=np.float64)
             triangles = np.asarray(structure.triangles, dtype=np.int64)
             edges = np.asarray(structure.pattern.edges, dtype=np.int64)
-            count = len(structure.pattern.vertices)
-            return cls(rest, rest[np.newaxis], triangles, count, edges)
+            return cls(rest, rest[np.newaxis], triangles, len(structure.pattern.vertices), edges)
         if "displacement" not in thing or "rest_position" not in thing:
             raise InputError("--model: the result has no displacements; give a case or a path")
         at_rest = cls.of(case_of(thing))
@@ -107,9 +106,8 @@ class View:
     def project(self, points: ArrayLike) -> Array:
         """Pixels (..., 2) at which points (..., 3) in m are seen."""
         seen = (np.asarray(points, dtype=np.float64) - self.origin) @ self.rotation.T
-        shrink = 1.0 + seen[..., 2:] / self.distance
         flat = (self.center - self.axis) + seen[..., :2] / self.metres_per_pixel
-        return self.axis + flat / shrink
+        return self.axis + flat / (1.0 + seen[..., 2:] / self.distance)
 
     def depth(self, points: ArrayLike) -> Array:
         """Distance of points (..., 3) behind the plane of the scale (m)."""
@@ -170,8 +168,7 @@ def fit_view(
         if not scaled:
             moved = replace(moved, metres_per_pixel=view.metres_per_pixel * np.exp(x[5]))
         if not placed:
-            near = max(nearness + x[5 + (not scaled)], 1e-9)
-            moved = replace(moved, distance=extent / near)
+            moved = replace(moved, distance=extent / max(nearness + x[5 + (not scaled)], 1e-9))
         state = float(x[-1]) if shapes is not None else 0.0
         if shapes is None:
             return moved, points, state

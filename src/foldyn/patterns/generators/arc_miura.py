@@ -94,15 +94,13 @@ def arc_miura(
         k = s * math.cos(g1) * slope
         turns = [2.0 * math.atan2(k, each) for each in along]
         check_turn("cells[1]", ny, math.degrees(turns[0] - turns[1]), "cells")
-    j = np.arange(2 * ny + 1)
-    odd = j % 2
+    odd = np.arange(2 * ny + 1) % 2
     turn = np.where(odd, -turns[1], turns[0])
     # direction (rad) of the straight edge after each corner, and of the bisector there
     leaving = np.cumsum(turn) - 0.5 * turns[0]
     bisector = leaving - 0.5 * turn
     lengths = np.where(odd, a + 0.5 * change, a - 0.5 * change)[:-1]
-    steps = (lengths * np.exp(1j * leaving[:-1])).cumsum()
-    corner = np.concatenate([[0.0], steps])
+    corner = np.concatenate([[0.0], (lengths * np.exp(1j * leaving[:-1])).cumsum()])
     shift = np.hypot(k, np.where(odd, along[1], along[0])) * np.exp(1j * bisector)
     i, _ = indices(2 * nx, 2 * ny)
     place = corner + np.where(i % 2, shift, 0.0)

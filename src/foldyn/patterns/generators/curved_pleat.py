@@ -81,12 +81,11 @@ def curved_pleat(
     across = np.sqrt(np.maximum(chord**2 - along**2, 0.0))
     i, j = indices(segments, pleats)
     x, y = (np.concatenate([[0.0], np.cumsum(part)])[i] for part in (across, along))
-    z = a * math.sin(tilt) * (j % 2)
     letters = None
     if flat:
         letters = curved_pleat(
             pleats, segments, a=a, radius=radius, arc=arc, dihedral=(180 + steepest) / 2
         ).assignments
-    places = [x, y + a * math.cos(tilt) * j, z]
+    places = [x, y + a * math.cos(tilt) * j, a * math.sin(tilt) * (j % 2)]
     periods = opposite(segments, pleats)[1:] if pleats % 2 == 0 else ()
     return sheet("curved pleat", places, ("curve", "ruling"), letters, periods)

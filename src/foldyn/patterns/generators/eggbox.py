@@ -63,5 +63,4 @@ def eggbox(
     s = b * math.sin(gamma) * math.cos(half) / cos_y
     i, j = indices(2 * nx, 2 * ny)
     places = [s * i, along_y * j, h1 * (j % 2) + h2 * (i % 2)]
-    families = "along_x", "along_y"
-    return sheet("eggbox", places, families, periods=opposite(2 * nx, 2 * ny))
+    return sheet("eggbox", places, ("along_x", "along_y"), periods=opposite(2 * nx, 2 * ny))

@@ -82,7 +82,6 @@ def miura_letters(columns: int, rows: int) -> dict[Edge, str]:
     """Assignments of the creases of a flat sheet."""
     zigzag, straight = lines(columns, rows)
     step = rows + 1
-    letters = {pair: "M" if pair[0] % step % 2 else "V" for pair in zigzag}
-    return letters | {
+    return {pair: "M" if pair[0] % step % 2 else "V" for pair in zigzag} | {
         (low, high): "V" if (low // step + low % step) % 2 else "M" for low, high in straight
     }

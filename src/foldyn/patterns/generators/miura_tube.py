@@ -77,8 +77,7 @@ def tube(cells: int, a: float, b: float, panel_angle: float, dihedral: float) ->
     strip = miura((cells, 1), a, b=b, panel_angle=panel_angle, dihedral=dihedral).vertices.reshape(
         -1, 3, 3
     )
-    mirrored = strip[:, 1:2] * [1.0, 1.0, -1.0]
-    return np.concatenate([strip, mirrored], axis=1).reshape(-1, 3)
+    return np.concatenate([strip, strip[:, 1:2] * [1.0, 1.0, -1.0]], axis=1).reshape(-1, 3)
 
 
 def tube_panels(stations: int, first: int = 0) -> tuple[list[tuple[int, ...]], dict]:

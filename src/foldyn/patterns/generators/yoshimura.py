@@ -82,6 +82,5 @@ def yoshimura(
             faces.append((short + k - 1, long + k, short + k)[::up])
             families["ring"].append((short + k - 1, short + k))
     letters = {"ring": "V", "diagonal": "M"}
-    upward = [(k, first[ny] + k) for k in range(nx + 1)]
-    periods = [] if ny % 2 else [upward]
+    periods = [] if ny % 2 else [[(k, first[ny] + k) for k in range(nx + 1)]]
     return assembled("yoshimura", vertices, faces, families, letters, periods=periods)

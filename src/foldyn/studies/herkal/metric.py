@@ -132,8 +132,7 @@ def rank_correlation(a: Mapping[str, float], b: Mapping[str, float]) -> float:
     """Spearman's rank correlation of two sets of errors: 1 for equal, -1 for reverse order."""
     first, second = ranks(a), ranks({m: b[m] for m in a})
     n = len(first)
-    apart = sum((first[m] - second[m]) ** 2 for m in first)
-    return 1.0 - 6.0 * apart / (n * (n * n - 1))
+    return 1.0 - 6.0 * sum((first[m] - second[m]) ** 2 for m in first) / (n * (n * n - 1))
 
 
 @dataclass(frozen=True, eq=False)

@@ -143,10 +143,9 @@ def rank_table(study: Study) -> Table:
     """Table of the mean rank of each distribution, in the paper and in ours."""
     models, paper = study.plan.models, {c: paper_table()[c] for c in study.plan.cases}
     theirs, ours = mean_ranks(paper, RULES), mean_ranks(study.table(), models)
-    header = ["model", "mean rank, paper", "mean rank, here"]
     rows = [[label, theirs.get(m), cell(ours[m])] for m, label in models.items()]
     caption = f"Mean rank over {len(study.plan.cases)} cases (1 is best)."
-    return Table(header, rows, caption, digits=3)
+    return Table(["model", "mean rank, paper", "mean rank, here"], rows, caption, digits=3)
 
 
 def _claims(study: Study) -> Table:
@@ -250,9 +249,8 @@ def _errors(study: Study, case: str, nodes: list[int]) -> Table:
         for model, label in study.plan.models.items()
         if (errors := study.node_errors(case, model)) is not None
     ]
-    header = ["model", *[f"node {n}" for n in nodes], "mean"]
     caption = "Error of the frequency content against the shell, per node."
-    return Table(header, rows, caption, digits=3)
+    return Table(["model", *[f"node {n}" for n in nodes], "mean"], rows, caption, digits=3)
 
 
 def _modes(study: Study, case: str) -> Table:

@@ -140,8 +140,7 @@ class Job(Task):
             found = trace(case, steps=STEPS)
         elif self.kind == "modes":
             count = SHELL_MODES if self.model == REFERENCE else RULE_MODES
-            unloaded = replace(case, loads=())
-            found = modes(unloaded, count, secant=self.secant, check_model=False)
+            found = modes(replace(case, loads=()), count, secant=self.secant, check_model=False)
         else:
             own = {"method": "newmark", "dt": self.numerics.dt} if self.implicit else {}
             given = {"interval": INTERVAL, **case_file.analysis.arguments, **own}

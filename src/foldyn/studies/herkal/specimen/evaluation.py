@@ -280,8 +280,7 @@ def compared(
     one = released.free.of(front, "front nodes")
     curves = []
     for support, motion in motions.items():
-        case = read_case(released.cases[support]).case()
-        curve = one.modelled(motion, case)
+        curve = one.modelled(motion, read_case(released.cases[support]).case())
         curves.append(curve - one.trend(curve))
     places = [released.free.nodes.index(node) for node in front]
     whole, line = released.free.whole[:, places], one.trend(one.values)

@@ -81,9 +81,8 @@ def plot_supports(front: xr.Dataset, label: str, note: str) -> Figure:
     style.frame(left, "time (s)", "x displacement (mm)", f"node {WATCHED}")
     style.frame(right, "frequency (Hz)", "x amplitude (mm)")
     time, step = front["time"].values, sampling_interval(front["time"].values)
-    film = front["measured"].sel(node=WATCHED).values
     look = {"color": style.BLACK, "marker": ".", "markersize": 3.5, "linestyle": "none"}
-    handles = left.plot(time, 1e3 * film, **look, label=label)
+    handles = left.plot(time, 1e3 * front["measured"].sel(node=WATCHED).values, **look, label=label)
     _plot_content(right, front["whole"].sel(node=WATCHED).values, step, look)
     for k, (support, name) in enumerate(SUPPORT_NAMES.items()):
         x = front["model"].sel(node=WATCHED, support=support).values
@@ -308,8 +307,7 @@ def _vibrations(front: xr.Dataset, data: Data) -> list[Section]:
         digits=3,
     )
     held, alone = (found[f"model: {SUPPORT_NAMES[key]}"].peak for key in (FILM_SUPPORT, ALONE))
-    glue = Text(_glue(held, alone, paper["release_frequency"].value))
-    return [table, *_tracked(front), glue]
+    return [table, *_tracked(front), Text(_glue(held, alone, paper["release_frequency"].value))]
 
 
 def _tracked(front: xr.Dataset) -> list[Section]:

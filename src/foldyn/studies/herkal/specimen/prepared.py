@@ -134,8 +134,7 @@ def _filled(x: NDArray[np.float64], start: int, stop: int, gap: int) -> NDArray[
     if not before.size or not after.size:
         return np.full(stop - start, np.nan)
     first, last = int(before[-1]), int(after[0])
-    inside = known[(known >= first) & (known <= last)]
-    if np.diff(inside).max() - 1 > gap:
+    if np.diff(known[(known >= first) & (known <= last)]).max() - 1 > gap:
         return np.full(stop - start, np.nan)
     return signals.fill_gaps(x[first : last + 1], gap)[start - first : stop - first]
 

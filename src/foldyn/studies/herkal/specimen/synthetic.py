@@ -32,11 +32,7 @@ RELAXING: Mapping[str, Any] = {
     }
 }
 # changes to the model, which has circumcenter masses and elastic creases
-OTHERWISE: Mapping[str, Any] = {
-    **SOFTER,
-    **RELAXING,
-    "model.mass": "consistent",
-}
+OTHERWISE: Mapping[str, Any] = {**SOFTER, **RELAXING, "model.mass": "consistent"}
 SUPPORT = "glued"
 TRACKED = "film.mkv"
 
@@ -130,9 +126,7 @@ def held(motion: xarray.Dataset, duration: float) -> xarray.Dataset:
     """Motion preceded by some time (s) in which the sheet is held."""
     u, time = motion["displacement"].values, motion["time"].values
     step = time[1] - time[0]
-    count = round(duration / step)
-    moved = np.concatenate([np.repeat(u[:1], count, axis=0), u])
+    moved = np.concatenate([np.repeat(u[:1], round(duration / step), axis=0), u])
     times = np.arange(len(moved)) * step
     kept = motion.drop_dims("time").assign_coords(time=("time", times, motion["time"].attrs))
-    along = ("time", "node", "axis")
-    return kept.assign(displacement=(along, moved, motion["displacement"].attrs))
+    return kept.assign(displacement=(("time", "node", "axis"), moved, motion["displacement"].attrs))
