@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from foldyn.cases.history import CALLED
 from foldyn.cases.waveforms import waveform_table
-from foldyn.dynamics.checkpoint import state_parts
+from foldyn.dynamics.checkpoint import beyond_samples, state_parts
 from foldyn.dynamics.engine import Engine
 from foldyn.dynamics.gpu import card
 from foldyn.dynamics.gpu.arrays import CaseArrays
@@ -315,6 +315,10 @@ class CardEngine(Engine):
         self._sums = np.array(arrays["card_sums"])
         super().resume_from(arrays)
         self._launches = self._launched()
+
+    def continuation(self) -> NDArray:
+        """Numbers to continue from the last sample; see `Engine`."""
+        return beyond_samples(self._packed, self._state)
 
     def changing(self) -> dict[str, Any]:
         """What the next steps depend on; see `Engine`."""

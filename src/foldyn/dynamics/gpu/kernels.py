@@ -293,7 +293,8 @@ def kernel(method: str, wide: bool, shared: bool, plates: bool) -> Any:
         if plates:
             table, of = elements.plates, elements.plates.model
             sheet = BarsPlates(
-                Rest(at(elements.model.rest, m)), of.rotations, table.per_reach[m],
+                Rest(at(elements.model.rest, m)),  # type: ignore[arg-type]
+                of.rotations, table.per_reach[m],
                 of.rotation_hinge, of.hinges, at(of.wings, m), of.fold_rotations, of.fold_ways,
                 at(of.unmoved, m), at(of.fold_stiffness, m), at(of.fold_rest, m),
                 at(of.fold_parameters, m), of.code, of.addresses, at(of.bend_rest, m), of.start,
