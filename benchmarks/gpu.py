@@ -105,25 +105,42 @@ def told(what: str, mine: Any, again: Any, alone: Any) -> None:
     )
 
 
+def plates_of(cells: tuple[int, int], stiffer: float = 1.0) -> fd.Case:
+    """A Miura sheet of `n5b8e`, clamped along an edge of one panel and held at the others' ends."""
+    pattern = fd.patterns.miura(cells, panel_angle=60.0, dihedral=120.0)
+    x = pattern.vertices[:, 0]
+    held, far = np.flatnonzero(x <= 1e-9), np.flatnonzero(x >= x.max() - 1e-9)
+    edge = next((a, b) for a, b in pattern.boundary.tolist() if {a, b} <= {*held.tolist()})
+    structure = fd.discretize(
+        pattern, fd.Sheet(1e6 * stiffer, 0.25, 0.01, density=1.0), preset="n5b8e",
+        fold_law="enhanced", mass="mixed_voronoi", clamped=[edge],
+    )  # fmt: skip
+    load = fd.Force(far, (0.0, 0.0, -1e-4))
+    return fd.Case(structure, [fd.Fix(held)], [load], fd.Rayleigh(alpha=0.0628))
+
+
 def agreement() -> None:
     """Motions of 1,000 steps on both."""
     for method in METHODS:
-        for cells in ((4, 3), (30, 30)):
-            case = case_of(cells, "enhanced")
+        sheets = [case_of(cells, "enhanced") for cells in ((4, 3), (30, 30))]
+        plates = [plates_of(cells) for cells in ((4, 3), (15, 15))]
+        for case in sheets + plates:
             dt = PART * fd.critical_step(case, method)
             given = {"dt": dt, "every_steps": 100, "initial": shaken(case)}
             one, two = (
                 fd.simulate(case, 1000 * dt, method=method, device="gpu", **given) for _ in range(2)
             )
-            told(f"{method}, {case.fixed.size} dofs", one, two, fd.simulate(
+            what = case.structure.massless or "hinges"
+            told(f"{method}, {case.fixed.size} dofs, {what}", one, two, fd.simulate(
                 case, 1000 * dt, method=method, **given
             ))  # fmt: skip
-        cases = [specimen("enhanced", k) for k in range(16)]
-        dt = PART * fd.critical_step(cases[-1], method)
-        given = {"dt": dt, "every_steps": 100, "method": method, "initial": shaken(cases[0])}
-        one, two = (fd.simulate_many(cases, 1000 * dt, device="gpu", **given) for _ in range(2))
-        alone = fd.simulate_many(cases, 1000 * dt, device="cpu", **given)
-        told(f"{method}, {len(cases)} specimens", one, two, alone)
+        specimens = [specimen("enhanced", k) for k in range(16)]
+        for cases in (specimens, [plates_of(SMALL, 1.0 + 0.01 * k) for k in range(16)]):
+            dt = PART * fd.critical_step(cases[-1], method)
+            given = {"dt": dt, "every_steps": 100, "method": method, "initial": shaken(cases[0])}
+            one, two = (fd.simulate_many(cases, 1000 * dt, device="gpu", **given) for _ in range(2))
+            alone = fd.simulate_many(cases, 1000 * dt, device="cpu", **given)
+            told(f"{method}, {len(cases)} models of {cases[0].fixed.size} dofs", one, two, alone)
 
 
 def prepared(case: fd.Case, method: str) -> Motion:

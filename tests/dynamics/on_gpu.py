@@ -59,9 +59,14 @@ interval = 2e-4
 """
 
 
-def case(k: int = 0, laws: str = "enhanced", damping=None, supports=(), **options) -> fd.Case:
+def case(
+    k: int = 0, laws: str = "enhanced", damping=None, supports=(), welds: int = 0, **options
+) -> fd.Case:  # fmt: skip
     """A cell, whose geometry, stiffness, mass, loads and damping go by the number."""
     pattern = fd.patterns.miura((1, 1), panel_angle=60.0, dihedral=110.0 + 2 * k)
+    if welds:
+        plain = dict.fromkeys(("assignments", "families", "fold_angles"))
+        pattern = pattern.changed(welds=pattern.creases[:welds], **plain)
     material = fd.Sheet(1e6 * (1.0 + 0.1 * k), 0.25, 0.01, density=1.0 + 0.05 * k)
     fold, bend = LAWS[laws]
     given = {"mass": "mixed_voronoi", "fold_law": fold, "bend_law": bend, **options}
@@ -98,6 +103,17 @@ CASES = {
 }
 
 
+PLATES = {"preset": "n5b8e", "bend_law": "linear"}
+OF_PLATES = {
+    "held": {},
+    "clamped": {"clamped": [(0, 1)], "damping": fd.Rayleigh(0.3, 1e-6)},
+    "damped": {"damping": CREASES, "supports": [*SPRINGS, *DASHPOTS], "laws": "plate"},
+    "bars": {"membrane": "bars", "laws": "locking"},
+    "welded": {"welds": 1},
+}
+PAIRS = [*zip(OF_PLATES, cycle(METHODS), strict=False), ("clamped", "rk4")]
+
+
 @pytest.mark.parametrize(("name", "method"), [*zip(CASES, cycle(METHODS), strict=False)])
 def test_a_motion_is_that_of_the_cpu(method, name):
     each = case(1, **CASES[name])
@@ -114,9 +130,34 @@ def test_a_motion_is_that_of_the_cpu(method, name):
     assert mine.attrs["device"]
 
 
+@pytest.mark.filterwarnings("ignore::foldyn.errors.StretchWarning")
+@pytest.mark.parametrize(("name", "method"), PAIRS)
+def test_a_motion_of_plates_is_that_of_the_cpu(method, name):
+    each = case(1, **PLATES | OF_PLATES[name])
+    given = {"method": method, "initial": shaken(each), **STEPS}
+    mine, again = (fd.simulate(each, END, device="gpu", **given) for _ in range(2))
+    alone = fd.simulate(each, END, **given)
+    agree(mine, alone, 1e-11)  # energies of creases are differences of small angles
+    gap = np.abs(mine.displacement - alone.displacement).max()
+    assert gap <= 1e-12 * np.abs(alone.displacement).max()
+    stored = [sum(each[n] for n in each if str(n).startswith("strain")) for each in (mine, alone)]
+    np.testing.assert_allclose(*stored, rtol=1e-12)
+    assert all(mine[name].equals(again[name]) for name in mine.data_vars)
+
+
+def test_a_motion_of_plates_goes_on_with_their_edge_angles():
+    each = case(1, **PLATES)
+    given = {"method": "central_difference", "device": "gpu", **STEPS}
+    begun = fd.simulate(each, END, initial=shaken(each), **given)
+    alone = fd.simulate(each, END, initial=shaken(each), **(given | {"device": "cpu"}))
+    gap = np.abs(begun.continuation - alone.continuation).max()
+    assert gap <= 1e-12 * np.abs(alone.continuation).max()
+
+
+@pytest.mark.parametrize("options", [{}, PLATES])
 @pytest.mark.parametrize("method", SOME)
-def test_many_are_those_of_the_cpu(method):
-    cases = [case(k) for k in range(2)]
+def test_many_are_those_of_the_cpu(method, options):
+    cases = [case(k, **options) for k in range(2)]
     given = {"method": method, "initial": [shaken(c, k) for k, c in enumerate(cases)], **STEPS}
     mine = fd.simulate_many(cases, END, device="gpu", **given)
     agree(mine, fd.simulate_many(cases, END, **given), 1e-9)

@@ -57,8 +57,9 @@ def sheet(**options) -> fd.Case:
 
 
 LUMPED = {"mass": "mixed_voronoi", "preset": "plate"}
+PLATES = lambda: sheet(preset="n5b8e", mass="mixed_voronoi")  # noqa: E731
 REFUSED = {
-    "panels bend as plates": lambda: sheet(preset="n5b8e"),
+    "the model Shell": lambda: fd.Case(fd.shell(PATTERN, SHEET, divisions=1), [HELD]),
     "not diagonal": lambda: sheet(preset="herkal", mass="consistent"),
     "the term ": lambda: fd.Case(
         fd.discretize(PATTERN, SHEET, **LUMPED), [HELD], contact=fd.Contact()
@@ -146,7 +147,7 @@ def test_few_or_short_motions_stay_on_the_cpu(monkeypatch):
     assert choice.choose([motion], 1000, 2) == ("cpu", "no GPU is here")
     monkeypatch.setattr(choice, "no_card", lambda: "")
     assert choice.choose([motion], 1000, 2)[0] == "gpu"
-    for other, why in ((REFUSED["the term "](), "the term "), (sheet(preset="n5b8e"), "plates")):
+    for other, why in ((REFUSED["the term "](), "the term "), (PLATES(), "plates")):
         device, reason = choice.choose([prepare(other, 1.0, "central_difference")], 1000, 2)
         assert device == "cpu" and why in reason
     monkeypatch.setattr(choice, "LARGEST", 30)

@@ -367,6 +367,13 @@ def _digest(array: Any) -> str | None:
     return hashlib.sha256(text + values.tobytes()).hexdigest()[:16]
 
 
+def beyond_samples(packed: PackedCase, state: MotionState) -> NDArray:
+    """Displacement and velocity, if these include dofs that samples do not hold; else (0,)."""
+    if not len(packed.body.hidden):
+        return np.zeros(0)
+    return np.concatenate([state.u.ravel(), state.v.ravel()])
+
+
 def state_parts(packed: PackedCase, state: MotionState) -> dict[str, Any]:
     """Mutable state of a case and its motion, the same for all methods."""
     memory = packed.body.find(HingeMemory)

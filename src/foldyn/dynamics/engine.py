@@ -28,6 +28,10 @@ class Engine(ABC):
         """Advance the motion by at most `stretch` steps; returns (outcome, hinge)."""
 
     @abstractmethod
+    def continuation(self) -> NDArray:
+        """What samples do not hold, to continue from the last one; (0,) if they hold all."""
+
+    @abstractmethod
     def changing(self) -> dict[str, Any]:
         """What the next steps depend on, apart from the case, when a stretch has ended."""
 

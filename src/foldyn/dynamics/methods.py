@@ -17,7 +17,7 @@ from foldyn.dynamics import (
     energy_momentum,
     generalized_alpha,
 )
-from foldyn.dynamics.checkpoint import state_parts
+from foldyn.dynamics.checkpoint import beyond_samples, state_parts
 from foldyn.dynamics.engine import Engine
 from foldyn.dynamics.equation import EquationOfMotion, accelerate
 from foldyn.dynamics.implicit.engine import ImplicitEngine
@@ -92,11 +92,8 @@ class ExplicitEngine(Engine):
         return run_together(self._loop, [own.team for own in self._threads], arguments)[0]
 
     def continuation(self) -> NDArray:
-        """Displacement and velocity, if these include dofs that samples do not hold; else (0,)."""
-        state = self._state
-        if not len(self._packed.body.hidden):
-            return np.zeros(0)
-        return np.concatenate([state.u.ravel(), state.v.ravel()])
+        """Numbers to continue from the last sample; see `Engine`."""
+        return beyond_samples(self._packed, self._state)
 
     def accelerate(self) -> None:
         """Recompute the current acceleration, for methods that store it."""

@@ -368,7 +368,7 @@ class Motion:
         if self.case.contact is not None:
             return found
         stopped = not self.stored or self.packed.callbacks.error is not None
-        if isinstance(engine, ImplicitEngine | ExplicitEngine) and not stopped:
+        if isinstance(engine, Engine) and not stopped:
             if self.continued and getattr(engine, "continues", True):
                 found["continued_from"] = self.output.time(0), self.continued
             last, values = self.output.time(self.stored - 1), engine.continuation()

@@ -121,8 +121,7 @@ def plates_scratch(model: BarsPlates) -> PlatesScratch:
     most, blocks = int(np.diff(model.start).max(initial=0)), -(-nh // BLOCK)
     corners = np.ascontiguousarray(model.hinges, np.uint32).ravel()
     return PlatesScratch(
-        force_scratch(model.bars), corners, np.zeros(4 * model.nodes),
-        np.zeros(4 * model.nodes),
+        force_scratch(model.bars), corners, np.zeros(4 * model.nodes), np.zeros(4 * model.nodes),
         np.ones(12 * BLOCK), np.zeros(13 * BLOCK * blocks), np.zeros(nh),
         np.zeros((nh, 12)), np.zeros(nh), np.zeros(nf), np.zeros(model.rotations),
         np.zeros(most), np.array([0, model.rows]), team(1)[0],
@@ -218,29 +217,42 @@ def put_rotations(model, z, share, angle, out):
     for k in range(out.size):
         out[k] = z[k]
     for f in range(model.unmoved.size):
-        one, other = model.fold_rotations[f]
-        turn = (angle[f] - share * model.unmoved[f]) / model.per_reach
-        if one >= 0 and other >= 0:
-            half = 0.5 * (turn - z[one])
-            out[one], out[other] = half + z[other], half - z[other]
-        elif one >= 0 or other >= 0:
-            only = max(one, other)
-            out[only] = turn - z[only]
+        put_rotations_beside(model, f, z, share, angle, out)
+
+
+@inner_scalar
+def put_rotations_beside(model, f, z, share, angle, out):
+    """Put the rotations beside fold f into `out`; see `put_rotations`."""
+    one, other = model.fold_rotations[f, 0], model.fold_rotations[f, 1]
+    turn = (angle[f] - share * model.unmoved[f]) / model.per_reach
+    if one >= 0 and other >= 0:
+        half = 0.5 * (turn - z[one])
+        out[one], out[other] = half + z[other], half - z[other]
+    elif one >= 0 or other >= 0:
+        only = max(one, other)
+        out[only] = turn - z[only]
 
 
 @kernel
 def hand_over(model, couple, moment):
     """Turn forces on rotations into those on dofs, in place; the rest adds to moments of hinges."""
     for f in range(model.unmoved.size):
-        one, other = model.fold_rotations[f]
-        if one >= 0 and other >= 0:
-            half, apart = 0.5 * (couple[one] + couple[other]), couple[one] - couple[other]
-            couple[one], couple[other] = -half, apart
-            moment[f] += half / model.per_reach
-        elif one >= 0 or other >= 0:
-            only = max(one, other)
-            moment[f] += couple[only] / model.per_reach
-            couple[only] = -couple[only]
+        moment[f] += hand_over_beside(model, f, couple)
+
+
+@inner_scalar
+def hand_over_beside(model, f, couple):
+    """Turn forces on the rotations beside fold f into those on dofs; returns its moment, N m."""
+    one, other = model.fold_rotations[f, 0], model.fold_rotations[f, 1]
+    if one >= 0 and other >= 0:
+        half, apart = 0.5 * (couple[one] + couple[other]), couple[one] - couple[other]
+        couple[one], couple[other] = -half, apart
+        return half / model.per_reach
+    if one >= 0 or other >= 0:
+        only = max(one, other)
+        couple[only] = -couple[only]
+        return -couple[only] / model.per_reach
+    return 0.0
 
 
 def handed_over(model: BarsPlates, push: NDArray) -> tuple[NDArray, NDArray]:
@@ -255,12 +267,19 @@ def handed_over(model: BarsPlates, push: NDArray) -> tuple[NDArray, NDArray]:
 def turn_folds(model, x, scratch):
     """Angles of the folds with rotations x."""
     for f in range(model.fold_rest.size):
-        scratch.fold_angle[f] = scratch.angle[f]
-        for side in range(2):
-            rotation = model.fold_rotations[f, side]
-            if rotation >= 0:
-                turn = model.per_reach * x[rotation]
-                scratch.fold_angle[f] -= model.fold_ways[f, side] * turn
+        scratch.fold_angle[f] = turned_fold(model, f, x, scratch.angle)
+
+
+@inner_scalar
+def turned_fold(model, f, x, angle):
+    """Angle (rad) of fold f with rotations x, for dihedrals `angle`."""
+    out = angle[f]
+    for side in range(2):
+        rotation = model.fold_rotations[f, side]
+        if rotation >= 0:
+            turn = model.per_reach * x[rotation]
+            out -= model.fold_ways[f, side] * turn
+    return out
 
 
 @kernel
@@ -292,32 +311,43 @@ def turn_plate(model, angle, share, x, p, out):
 
     share : factor of the dihedrals at rest, 0 for rates.
     """
-    folds = model.fold_rest.size
     for k in range(model.start[p + 1] - model.start[p]):
-        h = model.angle[model.start[p] + k]
-        if h >= 0:
-            out[k] = angle[h] - share * model.bend_rest[h - folds]
-        else:
-            out[k] = model.per_reach * x[-1 - h]
+        out[k] = plate_angle(model, model.start[p] + k, angle, share, x)
+
+
+@inner_scalar
+def plate_angle(model, k, angle, share, x):
+    """Angle k of all plates, rad; see `turn_plate`."""
+    h = model.angle[k]
+    if h >= 0:
+        return angle[h] - share * model.bend_rest[h - model.fold_rest.size]
+    return model.per_reach * x[-1 - h]
 
 
 @inner
-def fold_moment(model, scratch, f):
-    """Moment (N m) of a fold."""
-    p = model.fold_parameters
-    return model.fold_stiffness[f] * hinge_moment(
-        model.code, scratch.fold_angle[f], model.fold_rest[f],
-        p[f, 0], p[f, 1], p[f, 2], p[f, 3], model.addresses[1],
+def fold_energy(model, f, angle):
+    """Energy (J) of fold f at its angle."""
+    rest, p = model.fold_rest[f], model.fold_parameters
+    return model.fold_stiffness[f] * hinge_energy(
+        model.code, angle, rest, p[f, 0], p[f, 1], p[f, 2], p[f, 3], model.addresses[0],
     )  # fmt: skip
 
 
 @inner
-def fold_slope(model, scratch, f):
-    """Slope of a fold's moment, per unit of its stiffness."""
-    p = model.fold_parameters
+def fold_moment(model, f, angle):
+    """Moment (N m) of fold f at its angle."""
+    rest, p = model.fold_rest[f], model.fold_parameters
+    return model.fold_stiffness[f] * hinge_moment(
+        model.code, angle, rest, p[f, 0], p[f, 1], p[f, 2], p[f, 3], model.addresses[1],
+    )  # fmt: skip
+
+
+@inner
+def fold_slope(model, f, angle):
+    """Slope of the moment of fold f at its angle, per unit of its stiffness."""
+    rest, p = model.fold_rest[f], model.fold_parameters
     return hinge_slope(
-        model.code, scratch.fold_angle[f], model.fold_rest[f],
-        p[f, 0], p[f, 1], p[f, 2], p[f, 3], model.addresses[2],
+        model.code, angle, rest, p[f, 0], p[f, 1], p[f, 2], p[f, 3], model.addresses[2],
     )  # fmt: skip
 
 
@@ -357,13 +387,8 @@ def plates_energy(model, bars, u, z, scratch, out):
     turn_hinges(model, u, scratch)
     put_rotations(model, z, 1.0, scratch.angle, scratch.x)
     turn_folds(model, scratch.x, scratch)
-    p = model.fold_parameters
     for f in range(model.fold_rest.size):
-        w = hinge_energy(
-            model.code, scratch.fold_angle[f], model.fold_rest[f],
-            p[f, 0], p[f, 1], p[f, 2], p[f, 3], model.addresses[0],
-        )  # fmt: skip
-        out[1] += model.fold_stiffness[f] * w
+        out[1] += fold_energy(model, f, scratch.fold_angle[f])
     for plate in range(model.start.size - 1):
         turn_plate(model, scratch.angle, 1.0, scratch.x, plate, scratch.turn)
         count = model.start[plate + 1] - model.start[plate]
@@ -407,21 +432,20 @@ def turn_moments(model, x, couple, scratch):
     couple[:] = 0.0
     scratch.moment[:] = 0.0
     for f in range(model.fold_rest.size):
-        scratch.moment[f] = fold_moment(model, scratch, f)
-    turn_rotations(model, couple, scratch)
+        scratch.moment[f] = fold_moment(model, f, scratch.fold_angle[f])
+        turn_rotations_beside(model, f, scratch.moment[f], couple)
     for p in range(model.start.size - 1):
         turn_plate(model, scratch.angle, 1.0, x, p, scratch.turn)
         add_plate_moments(model, couple, scratch, p)
 
 
-@inner
-def turn_rotations(model, couple, scratch):
-    """Add the forces of the folds' moments on the rotations beside them."""
-    for f in range(model.fold_rest.size):
-        for side in range(2):
-            rotation = model.fold_rotations[f, side]
-            if rotation >= 0:
-                couple[rotation] -= model.fold_ways[f, side] * model.per_reach * scratch.moment[f]
+@inner_scalar
+def turn_rotations_beside(model, f, moment, couple):
+    """Add the forces of the moment of fold f on the rotations beside it."""
+    for side in range(2):
+        rotation = model.fold_rotations[f, side]
+        if rotation >= 0:
+            couple[rotation] -= model.fold_ways[f, side] * model.per_reach * moment
 
 
 @inner
@@ -467,9 +491,8 @@ def _energies(own, u, out):
     plates_energy(model, own.bars, here, x, own.scratch, own.energy)
     for k in range(3):
         group = own.groups[k]
-        numbers_at(out, 3)[group] = own.energy[k] + (
-            0.0 if own.bars.first else numbers_at(out, 3)[group]
-        )
+        before = 0.0 if own.bars.first else numbers_at(out, 3)[group]
+        numbers_at(out, 3)[group] = before + own.energy[k]
 
 
 @mean_forces
@@ -486,16 +509,12 @@ def _mean_forces(own, u0, u1, before, h, t, force, powers):
     turn_folds(model, x1, scratch)
     scratch.moment[:] = 0.0
     for f in range(model.fold_rest.size):
-        angle = began[f]
-        for side in range(2):
-            rotation = model.fold_rotations[f, side]
-            if rotation >= 0:
-                angle -= model.fold_ways[f, side] * model.per_reach * x0[rotation]
+        angle = turned_fold(model, f, x0, began)
         scratch.moment[f] = model.fold_stiffness[f] * mean_moment(
             model.code, model.addresses, model.fold_parameters[f], 1.0, model.fold_rest[f], angle,
             scratch.fold_angle[f] - angle,
         )[0]  # fmt: skip
-    turn_rotations(model, couple, scratch)
+        turn_rotations_beside(model, f, scratch.moment[f], couple)
     for p in range(model.start.size - 1):
         turn_plate(model, began, 1.0, x0, p, first)
         turn_plate(model, scratch.angle, 1.0, x1, p, scratch.turn)

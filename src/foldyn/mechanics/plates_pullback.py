@@ -42,6 +42,7 @@ from foldyn.mechanics.plates import (
     rides,
     turn_folds,
     turn_plate,
+    turned_fold,
 )
 from foldyn.mechanics.pullback import Pulled, arrays_of, pullback, zeros_for
 from foldyn.mechanics.term import parted_rows
@@ -103,16 +104,12 @@ def pull_folds(model, x, y, scratch, back, by_x):
     turn_folds(model, x, scratch)
     out, p = back.out, model.fold_parameters
     for f in range(model.fold_rest.size):
-        stiffness, rate = model.fold_stiffness[f], back.rate[f]
+        stiffness, rate = model.fold_stiffness[f], turned_fold(model, f, y, back.rate)
         moment, slope, by_rest, by_a, by_b, by_c, _ = series_derivatives(
             model.code, scratch.fold_angle[f], model.fold_rest[f],
             p[f, 0], p[f, 1], p[f, 2], p[f, 3], 1.0, model.addresses,
         )  # fmt: skip
         scratch.moment[f] = stiffness * moment
-        for side in range(2):
-            rotation = model.fold_rotations[f, side]
-            if rotation >= 0:
-                rate -= model.fold_ways[f, side] * model.per_reach * y[rotation]
         back.moment[f] = stiffness * slope * rate
         for side in range(2):
             rotation, way = model.fold_rotations[f, side], model.fold_ways[f, side]

@@ -141,8 +141,8 @@ def _scatter(indptr, dof, first, nodes, block, data):
 @inner_scalar
 def _put_fold(model, scratch, f, floor, moment, stiffness):
     """Put moments and matrix of the angles of fold f: its dihedral, and rotations beside it."""
-    moment[0] = fold_moment(model, scratch, f)
-    slope = model.fold_stiffness[f] * max(fold_slope(model, scratch, f), floor)
+    moment[0] = fold_moment(model, f, scratch.fold_angle[f])
+    slope = model.fold_stiffness[f] * max(fold_slope(model, f, scratch.fold_angle[f]), floor)
     way, k = np.ones(3), 1
     for side in range(2):
         if model.fold_rotations[f, side] >= 0:

@@ -13,15 +13,28 @@ from foldyn.cases.springs import Made
 from foldyn.dynamics.gpu.checks import MOST_KINDS
 from foldyn.dynamics.gpu.elements import Counts, Damping, Elements
 from foldyn.dynamics.gpu.kernels import Nodes
+from foldyn.dynamics.gpu.plates import Plates
+from foldyn.dynamics.inertia import Inertia
 from foldyn.dynamics.system import PackedCase
 from foldyn.mechanics.constant_damping import DampingMatrix
 from foldyn.mechanics.membranes import Membranes
 from foldyn.mechanics.membranes_term import MembranesTerm
 from foldyn.mechanics.model import OF_BARS, BarsHinges
+from foldyn.mechanics.plates import BarsPlates
 from foldyn.mechanics.springs import Springs, SpringsTerm
 from foldyn.mechanics.viscous import Viscous, ViscousTerm, viscous
 
 TOPOLOGY = ("bars", "bar_runs", "hinges", "hinge_runs", "hinge_group", "addresses")
+OF_PLATES = "hinges", "fold_rotations", "fold_ways", "code", "start", "angle", "entry"
+OF_PANELS = (
+    "wings",
+    "unmoved",
+    "fold_stiffness",
+    "fold_rest",
+    "fold_parameters",
+    "bend_rest",
+    "stiffness",
+)
 NO_SPRINGS = Made().springs()
 NONE = np.zeros(0, np.int64)
 NO_DAMPERS = viscous(
@@ -48,7 +61,8 @@ class CaseArrays:
 
     def __init__(self, cases: Sequence[PackedCase]) -> None:
         first, bodies = cases[0], [packed.body for packed in cases]
-        models = [_with_force(packed.model) for packed in cases]
+        plates = [packed.model for packed in cases if isinstance(packed.model, BarsPlates)]
+        models = [_with_force(each) for each in _bars(cases)]
         model = models[0]
         self._entries: list[tuple[NDArray, NDArray, NDArray]] = []  # nodes, slots, signs
         self._slots = 0
@@ -65,19 +79,22 @@ class CaseArrays:
             [[t.elements for t in own] for own in self._terms(bodies, ViscousTerm)]
         )
         damping = self._damping(cases)
+        hidden = 3 * len(first.mass.hidden)
+        coupled = self._plates(plates, hidden) if plates else ()
         self.elements = Elements(
             _stacked(models, TOPOLOGY)._replace(
                 bars=model.bars.astype(np.int32), hinges=model.hinges.astype(np.int32)
             ),
             _codes(model.bar_runs), _codes(model.hinge_runs),
             (*membranes, *[_no_panels()] * (MOST_KINDS - len(membranes))),
-            springs, dampers, damping,
+            springs, dampers, damping, coupled,
         )  # fmt: skip
         rows, groups = first.system.rows, list(first.body.energy_groups)
         self.counts = Counts(
             rows, self._slots, len(groups),
             groups.index("strain_springs") if "strain_springs" in groups else 0,
             rows if len(damping.column) else 0,
+            hidden, len(plates[0].hinges) + 2 * hidden if plates else 0,
         )  # fmt: skip
         self.nodes = self._nodes(cases)
 
@@ -102,6 +119,8 @@ class CaseArrays:
     def _membranes(self, own: Sequence[Membranes]) -> Membranes:
         for v in range(own[0].nodes.shape[1]):
             self._add(own[0].nodes[:, v])
+        for k in range(own[0].gives.shape[1]):
+            self._add(own[0].gives[:, k] // 3)
         return _stacked(own, ("nodes", "ends", "gives"))
 
     def _springs(self, own: Sequence[Springs]) -> Springs:
@@ -141,6 +160,21 @@ class CaseArrays:
         start, column = own[0].indptr.astype(np.int64), own[0].indices.astype(np.int64)
         return Damping(start, column, _one_or_all([matrix.data for matrix in own]))
 
+    def _plates(self, own: Sequence[BarsPlates], hidden: int) -> Plates:
+        model, hinges = own[0], len(own[0].hinges)
+        for v in range(4):
+            self._add(model.hinges[:, v])
+        item = np.where(model.angle < 0, hinges - 1 - model.angle, model.angle)
+        order = np.argsort(item, kind="stable")
+        plate = np.repeat(np.arange(len(model.start) - 1), np.diff(model.start))
+        numbers = {name: _one_or_all([getattr(each, name) for each in own]) for name in OF_PANELS}
+        bare: Any = ()
+        return Plates(
+            model._replace(bars=bare, **numbers), np.array([each.per_reach for each in own]),
+            np.searchsorted(item[order], np.arange(hinges + hidden + 1)), order, plate[order],
+            np.setdiff1d(np.arange(hidden), model.fold_rotations),
+        )  # fmt: skip
+
     def _nodes(self, cases: Sequence[PackedCase]) -> Nodes:
         node, entry, slot = (np.concatenate(column) for column in zip(*self._entries, strict=True))
         order = np.lexsort((slot, node))
@@ -158,7 +192,7 @@ class CaseArrays:
             starts[k] = np.searchsorted(own.dof, np.arange(3 * rows + 1))
         return Nodes(
             start.astype(np.int32), entry[order].astype(np.int32), system.order, support,
-            _one_or_all([packed.mass.diagonal for packed in cases]),
+            _one_or_all([_masses(packed.mass) for packed in cases]),
             _one_or_all([packed.mass.inverse for packed in cases]),
             np.array([packed.system.alpha for packed in cases]),
             starts, load, load_row,
@@ -167,13 +201,15 @@ class CaseArrays:
 
 def topology(packed: PackedCase) -> tuple[Any, ...]:
     """Properties that all cases of one launch share."""
-    arrays = [getattr(packed.model, name) for name in TOPOLOGY]
+    arrays = [getattr(_bars([packed])[0], name) for name in TOPOLOGY]
+    if isinstance(packed.model, BarsPlates):
+        arrays += [np.asarray(getattr(packed.model, name)) for name in OF_PLATES]
     arrays += [packed.system.order, packed.system.supported]
     kinds = []
     for term in packed.body.others:
         kinds.append(type(term).__name__)
         if isinstance(term, MembranesTerm):
-            arrays += term.membranes[:2]
+            arrays += term.membranes[:3]
         elif isinstance(term, SpringsTerm):
             own = term.springs.lines
             arrays += [term.springs.ends, own.first, own.node, own.slack, own.scaled]
@@ -182,6 +218,19 @@ def topology(packed: PackedCase) -> tuple[Any, ...]:
         elif isinstance(term, ViscousTerm):
             arrays += [term.elements.dofs, np.array(len(term.elements.axial))]
     return (*kinds, *(array.tobytes() for array in arrays))
+
+
+def _bars(cases: Sequence[PackedCase]) -> list[BarsHinges]:
+    """The bars and hinges of cases; of plates, their bars."""
+    models = [packed.model for packed in cases]
+    return [each.bars if isinstance(each, BarsPlates) else each for each in models]
+
+
+def _masses(mass: Inertia) -> NDArray:
+    """Mass (rows, 3) of nodes, and inertia of the dofs after them, kg."""
+    out = np.repeat(mass.diagonal[:, None], 3, axis=1)
+    out[len(out) - len(mass.hidden) :] = mass.hidden
+    return out
 
 
 def _one_or_all(arrays: Sequence[NDArray]) -> NDArray:

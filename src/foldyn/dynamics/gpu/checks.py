@@ -15,8 +15,9 @@ from foldyn.errors import InputError
 from foldyn.mechanics.constant_damping import DampingMatrix
 from foldyn.mechanics.membranes_term import MembranesTerm
 from foldyn.mechanics.springs import SpringsTerm
-from foldyn.mechanics.viscous import ViscousTerm
+from foldyn.mechanics.viscous import Viscous, ViscousTerm
 from foldyn.structures.bars_hinges import BarsHingesTerm
+from foldyn.structures.bars_plates import BarsPlatesTerm
 
 # fields of a case that are checked
 FIELDS = "structure", "supports", "loads", "damping", "masses", "contact"
@@ -78,9 +79,10 @@ def lacking(case: Case, packed: PackedCase) -> str:
         if field.name not in FIELDS and not _is_default(field, getattr(case, field.name)):
             return f"{field.name} of the case"
     system, body = packed.system, packed.body
-    if type(body.sheet) is not BarsHingesTerm:
-        return 'a sheet whose panels bend as plates (preset = "plate" has hinges instead)'
-    if packed.model.addresses.any():
+    if type(body.sheet) not in (BarsHingesTerm, BarsPlatesTerm):
+        return f"the model {type(body.sheet).__name__.removesuffix('Term')}"
+    bars = packed.model.bars if type(body.sheet) is BarsPlatesTerm else packed.model
+    if packed.model.addresses.any() or bars.addresses.any():
         return "a law of your own"
     if not packed.mass.lumped:
         return "a constraint" if len(system.ties.slave) else "a mass matrix that is not diagonal"
@@ -96,16 +98,22 @@ def lacking(case: Case, packed: PackedCase) -> str:
             return f"the term {type(term).__name__.removesuffix('Term')}"
         if term.histories:
             return "a spring or cable that follows a history"
-        if isinstance(term, ViscousTerm) and term.elements.hidden_turn.any():
-            return "a damper at dofs without mass"
-        if isinstance(term, MembranesTerm) and len(term.membranes.ends) > MOST_BARS:
-            return f"a panel with more than {MOST_BARS} bars"
+        if isinstance(term, ViscousTerm) and _mixed(term.elements):
+            return "a damper at nodes and at dofs without mass"
+        if isinstance(term, MembranesTerm) and len(term.membranes.stiffness) > MOST_BARS:
+            return f"a panel with more than {MOST_BARS} bars and gives"
     for kind, what in ((SpringsTerm, "springs"), (ViscousTerm, "dampers")):
         if sum(isinstance(term, kind) for term in body.others) > 1:
             return f"a second set of {what}"
     if sum(isinstance(term, MembranesTerm) for term in body.others) > MOST_KINDS:
         return f"a sheet with more than {MOST_KINDS} kinds of panels"
     return f"more than {MOST_GROUPS} energies" if len(body.energy_groups) > MOST_GROUPS else ""
+
+
+def _mixed(elements: Viscous) -> bool:
+    """Whether dampers act on dofs without mass beside those of nodes."""
+    dofs = elements.dofs[len(elements.axial) :]
+    return bool((elements.hidden_turn.any(axis=1) & (dofs[:, 0] != dofs[:, 1])).any())
 
 
 def _is_default(field: Any, value: Any) -> bool:

@@ -42,6 +42,8 @@ def choose(
     for motion in known.values():
         if lack := lacking(motion.case, motion.packed):
             return "cpu", f"{lack} has no GPU kernel"
+        if motion.case.structure.massless:
+            return "cpu", "kernels for panels that bend as plates have not run on a GPU yet"
     if why := no_card():
         return "cpu", why.partition(";")[0]
     return "gpu", seconds

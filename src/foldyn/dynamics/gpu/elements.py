@@ -29,11 +29,13 @@ strength, idle, per_length = ported(lines.strength), ported(lines.idle), ported(
 class Counts(NamedTuple):
     """Numbers of elements, nodes and slots."""
 
-    nodes: int
+    nodes: int  # rows of three: the nodes, then dofs without mass
     slots: int  # number of slots, each for a force vector
     groups: int  # number of strain energy groups
     spring_group: int
     damped: int  # rows of the damping matrix: all nodes, or 0
+    hidden: int  # dofs in the rows after those of nodes, with padding
+    more: int  # further numbers after the slots, for plates
 
 
 class Damping(NamedTuple):
@@ -54,6 +56,7 @@ class Elements(NamedTuple):
     springs: Springs
     viscous: Viscous
     damping: Damping
+    plates: Any  # `plates.Plates`, or () without
 
 
 if SIMULATED:

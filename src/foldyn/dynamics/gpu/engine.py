@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from foldyn.cases.history import CALLED
 from foldyn.cases.waveforms import waveform_table
-from foldyn.dynamics.checkpoint import state_parts
+from foldyn.dynamics.checkpoint import beyond_samples, state_parts
 from foldyn.dynamics.engine import Engine
 from foldyn.dynamics.gpu import card
 from foldyn.dynamics.gpu.arrays import CaseArrays
@@ -89,7 +89,8 @@ class Launches:
         self._every = np.array([plan.every for plan in plans])
         self._counts, self._count = host.counts, len(cases)
         n, slots = host.counts.nodes, host.counts.slots
-        room = 8 * (3 * slots + 6 * n)
+        numbers = 3 * slots + host.counts.more
+        room = 8 * (numbers + 6 * n)
         shared = not wide and room <= card.SHARED
         own = self._count if not shared else 1
         needed = card.size_of(tuple(host.elements)) + card.size_of(tuple(host.nodes))
@@ -104,7 +105,8 @@ class Launches:
         self._elements = card.put(host.elements)
         self._nodes = card.put(host.nodes)
         self._room = room if shared else 0
-        self._kernel, self._shape = kernel(method, wide, shared), (self._count, n)
+        plates = len(host.elements.plates) > 0
+        self._kernel, self._shape = kernel(method, wide, shared, plates), (self._count, n)
         self._supported = len(cases[0].system.supported)
         self._compiled: Any = None
         self._from, self._hinges = places, places.angle.shape[1]
@@ -116,7 +118,7 @@ class Launches:
             alone = FEWEST if processors < m else MOST
             self._threads, self._blocks = (BLOCK, 8 * processors) if wide else (alone, m)
         self._ahead = (1, 1) if shared else (m, 3 * n)
-        self._slot = (1, 1) if shared else (m, 3 * slots)
+        self._slot = (1, 1) if shared else (m, numbers)
         self._set(places)
 
     def _histories(self) -> list[tuple[int, int] | None]:
@@ -196,11 +198,11 @@ class Launches:
         (k + 1, m, columns) have a last row for the end of the launch. The arrays fit the model with
         the most samples.
         """
-        m, n = self._shape
+        m, nodes = len(first), len(self._cases[0].system.order)
         count = max(0, int((last // self._every + 1 - sample).max()))
         room = max(1, count)
         out = Written(
-            cuda.device_array((m, room, n, 3)), cuda.device_array((m, room, n, 3)),
+            cuda.device_array((m, room, nodes, 3)), cuda.device_array((m, room, nodes, 3)),
             cuda.device_array((m, room, max(1, self._supported))), self._energies(count),
         )  # fmt: skip
         span = card.put(Span(first, last, self._dt, self._every, sample))
@@ -313,6 +315,10 @@ class CardEngine(Engine):
         self._sums = np.array(arrays["card_sums"])
         super().resume_from(arrays)
         self._launches = self._launched()
+
+    def continuation(self) -> NDArray:
+        """Numbers to continue from the last sample; see `Engine`."""
+        return beyond_samples(self._packed, self._state)
 
     def changing(self) -> dict[str, Any]:
         """What the next steps depend on; see `Engine`."""

@@ -3,7 +3,8 @@
 A force evaluation has two halves, separated by a barrier. First, the threads share the elements:
 each writes the corner forces of its elements to slots of their own. Then the threads share the
 nodes: each adds up the slots of its nodes, in a fixed order, and moves the nodes. Nothing is added
-atomically, so the same input gives the same bits on the same GPU.
+atomically, so the same input gives the same bits on the same GPU. Plates need another barrier
+within the first half (`plates`).
 
 One model per block lives in the block's shared memory; one model per grid in global memory.
 """
@@ -26,10 +27,12 @@ from foldyn.dynamics.gpu.elements import (
     rows_of,
     springs_to,
 )
+from foldyn.dynamics.gpu.plates import Rest, hinges_of_plates_to, moments_to
 from foldyn.dynamics.gpu.ported import SIMULATED, cuda, on_device, ported
 from foldyn.mechanics import membranes, viscous
 from foldyn.mechanics.membranes import Membranes
 from foldyn.mechanics.model import BarsHinges
+from foldyn.mechanics.plates import BarsPlates
 from foldyn.mechanics.viscous import Viscous
 
 strain_of = ported(membranes.strain_of)
@@ -42,9 +45,9 @@ class Nodes(NamedTuple):
 
     start: Any  # (n + 1,) first entry of each node
     entry: Any  # slots to add; -1 - slot for a slot to subtract
-    order: Any  # (n,) number of each node in the structure
+    order: Any  # number of each node in the structure; dofs without mass have none
     support: Any  # (3 n,) number of each dof among the supported ones, or -1
-    mass: Any  # (m, n)
+    mass: Any  # (m, n, 3)
     inverse: Any  # (m, n, 3)
     alpha: Any  # (m,)
     load_start: Any  # (m, 3 n + 1) first load of each dof
@@ -90,7 +93,7 @@ class Span(NamedTuple):
 
 @on_device
 def panels_to(kind, m, u, slot, size, at_slot, who, crowd, sampled, strain):
-    """Write corner forces of the panels of one kind; return the next free slot."""
+    """Write forces on corners and gives of the panels of one kind; return the next free slot."""
     own = Membranes(
         kind.nodes,
         kind.ends,
@@ -100,30 +103,40 @@ def panels_to(kind, m, u, slot, size, at_slot, who, crowd, sampled, strain):
         at(kind.stiffness, m),
     )
     count, corners, bars = own.nodes.shape[0], own.nodes.shape[1], own.ends.shape[0]
+    given = own.gives.shape[1]
     stretch, along = cuda.local.array(MOST_BARS, float64), cuda.local.array(3, float64)
     for p in range(who, count, crowd):
         for i in range(bars):
             stretch[i] = strain_of(own, u, p, i, along)
-        for v in range(corners):
+        for k in range(given):
+            stretch[bars + k] = u[own.gives[p, k] // 3, own.gives[p, k] % 3]
+        for v in range(corners + given):
             put(slot, size, at_slot + v * count + p, 0.0, 0.0, 0.0)
-        for i in range(bars):
+        for i in range(bars + given):
             pull = 0.0
-            for j in range(bars):
+            for j in range(bars + given):
                 pull += own.stiffness[i, j, p] * stretch[j]
             if sampled:
                 strain[0] += 0.5 * stretch[i] * pull
+            if i >= bars:
+                k = i - bars
+                slot[own.gives[p, k] % 3 * size + at_slot + (corners + k) * count + p] = pull
+                continue
             pull *= own.per_length2[i, p]
             strain_of(own, u, p, i, along)
             a, b = at_slot + own.ends[i, 0] * count + p, at_slot + own.ends[i, 1] * count + p
             for c in range(3):
                 slot[c * size + a] -= pull * along[c]
                 slot[c * size + b] += pull * along[c]
-    return at_slot + corners * count
+    return at_slot + (corners + given) * count
 
 
 @on_device
 def dampers_to(dampers, m, u, v, slot, size, at_slot, who, crowd):
-    """Write forces of viscous elements on their four nodes; return the dissipated power, W."""
+    """Write forces of viscous elements; return the dissipated power, W.
+
+    An element with a dof without mass acts on this dof alone, in the row of its "first node".
+    """
     own = Viscous(
         dampers.dofs, at(dampers.axial, m), at(dampers.corners, m), at(dampers.hidden_turn, m),
         at(dampers.coefficient, m), at(dampers.gradient, m),
@@ -132,7 +145,7 @@ def dampers_to(dampers, m, u, v, slot, size, at_slot, who, crowd):
     for e in range(who, count, crowd):
         viscous_gradient(own, u, e, g)
         rate = 0.0
-        for c in range(12):
+        for c in range(14):
             rate += g[c] * v[own.dofs[e, c]]
         resisted = own.coefficient[e] * rate
         for k in range(4):
@@ -140,6 +153,7 @@ def dampers_to(dampers, m, u, v, slot, size, at_slot, who, crowd):
             put(
                 slot, size, s, resisted * g[3 * k], resisted * g[3 * k + 1], resisted * g[3 * k + 2]
             )
+        slot[own.dofs[e, 12] % 3 * size + at_slot + e] += resisted * (g[12] + g[13])
         power += resisted * rate
     return power
 
@@ -199,7 +213,7 @@ def load_on(nodes, load_start, load, load_row, factor, time, dof):
 
 
 @on_device
-def meet(state, blocks, arrived):
+def meet_in_grid(state, blocks, arrived):
     """Wait for all threads of the grid; return the number of times they have met."""
     cuda.syncthreads()
     if cuda.threadIdx.x == 0:
@@ -210,6 +224,13 @@ def meet(state, blocks, arrived):
         cuda.threadfence()
     cuda.syncthreads()
     return arrived + 1
+
+
+@on_device
+def meet_in_block(state, blocks, arrived):
+    """The same for the threads of a block."""
+    cuda.syncthreads()
+    return arrived
 
 
 @on_device
@@ -234,14 +255,16 @@ def add_notes(state, row, columns):
 
 
 @lru_cache
-def kernel(method: str, wide: bool, shared: bool) -> Any:
+def kernel(method: str, wide: bool, shared: bool, plates: bool) -> Any:
     """Compile the time loop of a method as a CUDA kernel.
 
     wide : whether one model uses the whole grid; otherwise each block has one model.
     shared : whether the model is in shared memory.
+    plates : whether panels bend as plates.
     """
     runge = method == "rk4"
     stages, per_step = (4, 3) if runge else (1, 1)
+    meet = meet_in_grid if wide else meet_in_block
 
     def advance(elements, nodes, counts, span, factor, state, out):
         """Advance over a span of steps."""
@@ -251,13 +274,11 @@ def kernel(method: str, wide: bool, shared: bool) -> Any:
             m, who, crowd = cuda.blockIdx.x, cuda.threadIdx.x, cuda.blockDim.x
         blocks, thread = cuda.gridDim.x, cuda.blockIdx.x * cuda.blockDim.x + cuda.threadIdx.x
         n, size, groups = counts.nodes, counts.slots, counts.groups
+        real = nodes.order.shape[0]
         if shared:
-            slot = cuda.shared.array(0, float64)
-            ut, vt = rows_of(slot, 3 * size, n), rows_of(slot, 3 * size + 3 * n, n)
-            flat_u, flat_v = (
-                slot[3 * size : 3 * size + 3 * n],
-                slot[3 * size + 3 * n : 3 * size + 6 * n],
-            )
+            slot, own = cuda.shared.array(0, float64), 3 * size + counts.more
+            ut, vt = rows_of(slot, own, n), rows_of(slot, own + 3 * n, n)
+            flat_u, flat_v = slot[own : own + 3 * n], slot[own + 3 * n : own + 6 * n]
         else:
             slot, flat_u, flat_v = state.slot[m], state.ahead_u[m], state.ahead_v[m]
             ut, vt = rows_of(flat_u, 0, n), rows_of(flat_v, 0, n)
@@ -269,6 +290,21 @@ def kernel(method: str, wide: bool, shared: bool) -> Any:
             at(nodes.load, m),
             at(nodes.load_row, m),
         )
+        if plates:
+            table, of = elements.plates, elements.plates.model
+            sheet = BarsPlates(
+                Rest(at(elements.model.rest, m)),  # type: ignore[arg-type]
+                of.rotations, table.per_reach[m],
+                of.rotation_hinge, of.hinges, at(of.wings, m), of.fold_rotations, of.fold_ways,
+                at(of.unmoved, m), at(of.fold_stiffness, m), at(of.fold_rest, m),
+                at(of.fold_parameters, m), of.code, of.addresses, at(of.bend_rest, m), of.start,
+                of.angle, of.entry, at(of.stiffness, m),
+            )  # fmt: skip
+            hinges, hidden, z = of.hinges.shape[0], counts.hidden, flat_u[3 * real :]
+            turned = slot[3 * size : 3 * size + hinges]
+            x = slot[3 * size + hinges : 3 * size + hinges + hidden]
+            couple = slot[3 * size + hinges + hidden : 3 * size + hinges + 2 * hidden]
+            points, found = cuda.local.array((4, 3), float64), cuda.local.array(12, float64)
         strain = cuda.local.array(MOST_GROUPS, float64)
         force = cuda.local.array(3, float64)
         first_step, last_step, every = span.first[m], span.last[m], span.every[m]
@@ -295,10 +331,7 @@ def kernel(method: str, wide: bool, shared: bool) -> Any:
                             ut[i, c] = u[i, c]
                             vt[i, c] = v[i, c] + 0.5 * h * du[i, c]
                 first = stage == 0
-                if wide:
-                    arrived = meet(state, blocks, arrived)
-                else:
-                    cuda.syncthreads()
+                arrived = meet(state, blocks, arrived)
                 looks = first and sampled
                 if looks:
                     for g in range(groups):
@@ -308,20 +341,30 @@ def kernel(method: str, wide: bool, shared: bool) -> Any:
                     strain,
                 )  # fmt: skip
                 wrong += jumped
-                power_in, time = 0.0, per_step * (step - first_step) + (stage + 1) // 2
-                if wide:
+                if plates:
+                    wrong += hinges_of_plates_to(
+                        sheet, table.alone, ut, z, slot, size, size - 4 * hinges, who, crowd, first,
+                        angle, turned, x, points, found,
+                    )  # fmt: skip
                     arrived = meet(state, blocks, arrived)
-                else:
-                    cuda.syncthreads()
+                    moments_to(
+                        sheet, table, slot, size, size - 4 * hinges, who, crowd, looks, turned, x,
+                        couple, strain,
+                    )  # fmt: skip
+                power_in, time = 0.0, per_step * (step - first_step) + (stage + 1) // 2
+                arrived = meet(state, blocks, arrived)
                 ends = runge and step == last_step
                 for i in range(who, n, crowd):
                     sum_to(nodes, slot, size, i, force)
+                    if plates and i >= real:
+                        for c in range(3):
+                            force[c] += couple[3 * (i - real) + c]
                     for c in range(3):
                         dof, speed = 3 * i + c, vt[i, c]
                         pull = load_on(nodes, load_start, load, load_row, factor, time, dof)
                         left = force[c] - pull
                         power_in += pull * speed
-                        power_out += alpha * mass[i] * speed * speed
+                        power_out += alpha * mass[i, c] * speed * speed
                         a = -left * inverse[i, c] - alpha * speed
                         if not runge:
                             du[i, c] = a
@@ -329,9 +372,10 @@ def kernel(method: str, wide: bool, shared: bool) -> Any:
                             wrong += not abs(v[i, c]) < math.inf
                         if looks:
                             k, now = sample - first_sample, v[i, c]
-                            kinetic += 0.5 * mass[i] * now * now
-                            out.u[m, k, nodes.order[i], c] = u[i, c]
-                            out.v[m, k, nodes.order[i], c] = now
+                            kinetic += 0.5 * mass[i, c] * now * now
+                            if i < real:
+                                out.u[m, k, nodes.order[i], c] = u[i, c]
+                                out.v[m, k, nodes.order[i], c] = now
                             if nodes.support[dof] >= 0:
                                 out.reaction[m, k, nodes.support[dof]] = left
                         if runge and not ends:
