@@ -482,7 +482,7 @@ def test_from_photographs_and_a_film_to_a_calibrated_model(tmp_path, monkeypatch
     fit_release = partial(evaluation.fit_release, step=COARSER)
     near = replace(synthetic.PAPERS, size=(1814, 3226), metres_per_pixel=1e-4)
     monkeypatch.setattr(tasks, "PAPERS", near)
-    monkeypatch.setattr(matching, "_TURNS", np.zeros(1))  # the camera is nearly upright
+    monkeypatch.setattr(matching, "_BEST", 2)  # placements that are refined
     monkeypatch.setattr(calibration, "fit_damping", fit_once)
     monkeypatch.setattr(calibration, "shipped", with_few)
     monkeypatch.setattr(synthetic.Shot, "sensor", of_few)
