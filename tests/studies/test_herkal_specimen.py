@@ -17,7 +17,6 @@ from foldyn.analyses.reading import case_of_document, read_document
 from foldyn.cli.main import main
 from foldyn.errors import ComputationError, FoldynWarning, InputError
 from foldyn.experiment import ForceDisplacement, TimeHistory
-from foldyn.experiment.tracking import matching
 from foldyn.report.album import Album
 from foldyn.studies.herkal import calibration
 from foldyn.studies.herkal.calibration import DAMPING, FOLDS, FRONT, FULL, WATCHED
@@ -482,7 +481,6 @@ def test_from_photographs_and_a_film_to_a_calibrated_model(tmp_path, monkeypatch
     fit_release = partial(evaluation.fit_release, step=COARSER)
     near = replace(synthetic.PAPERS, size=(1814, 3226), metres_per_pixel=1e-4)
     monkeypatch.setattr(tasks, "PAPERS", near)
-    monkeypatch.setattr(matching, "_BEST", 2)  # placements that are refined
     monkeypatch.setattr(calibration, "fit_damping", fit_once)
     monkeypatch.setattr(calibration, "shipped", with_few)
     monkeypatch.setattr(synthetic.Shot, "sensor", of_few)
