@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import re
 import runpy
 import sys
 from pathlib import Path
@@ -326,16 +327,28 @@ LONG = (
 SHORT = [check for check in CHECKS if check not in LONG]
 
 
+def fewer(sweep):
+    """That sweep, in this process, with three values of a range and few samples."""
+
+    def swept(case, vary, **how):
+        few = {k: re.sub(r":7\b", ":3", v) if isinstance(v, str) else v for k, v in vary.items()}
+        samples = {"samples": 16} if "samples" in how else {}
+        return sweep(case, few, **how | samples, processes=1)
+
+    return swept
+
+
 @pytest.mark.filterwarnings("ignore::foldyn.errors.CrossingWarning")
 @pytest.mark.filterwarnings("ignore:.* creases stay closed that were to open")  # of the crane
 @pytest.mark.parametrize(
     "check", [*beyond(SHORT, 4), *beyond(LONG, 8)], ids=lambda check: check.__name__
 )
 def test_example(check, tmp_path, monkeypatch, capsys):
-    """Of films a few pictures; plots have tests of their own."""
+    """Of films a few pictures, of sweeps a few points; both have tests of their own."""
     monkeypatch.chdir(tmp_path)
     animate = fd.plots.animate
     monkeypatch.setattr(fd.plots, "animate", lambda *of, **how: animate(*of, **how | {"frames": 3}))
+    monkeypatch.setattr(fd, "sweep", fewer(fd.sweep))
     check(runpy.run_path(str(ROOT / "examples" / f"{check.__name__}.py"), run_name="__main__"))
     assert capsys.readouterr().out
     assert {path.suffix for path in tmp_path.iterdir()} & {".png", ".gif"}

@@ -35,7 +35,7 @@ assert modes.frequency.values.min() > 0.0
 ends = []
 implicit = "newmark", "generalized_alpha", "energy_momentum"
 for method in ("rk4", "central_difference", "dormand_prince", *implicit):
-    step = 1e-4 if method in implicit else None
+    step = 5e-4 if method in implicit else None
     found = fd.simulate(case, 0.05, method=method, dt=step)
     ends.append(found.displacement.values[-1])
     strain = sum(found[name] for name in case.energy_groups)
@@ -53,13 +53,16 @@ import numpy as np
 import foldyn as fd
 sheet = fd.Sheet(1e6, 0.25, 0.01, 1.0)
 pattern = fd.patterns.simple_fold(dihedral=120)
-plain, stiff = (fd.discretize(pattern, sheet, fold_law=law) for law in ("linear", "stiffening"))
+bars = {"preset": "herkal", "bend_law": "linear"}  # of other models more would be compiled
+plain, stiff = (
+    fd.discretize(pattern, sheet, fold_law=law, **bars) for law in ("linear", "stiffening")
+)
 theta, rest = 2.6, float(stiff.fold_rest[0])
 assert stiff.fold_law.moment(theta, rest) == (theta - rest) * (1.0 + (theta - rest) ** 2)
 
 def case(law, rest):
     structure = fd.discretize(
-        pattern, sheet, fold_law=law, crease_rest=rest, crease_stiffness=0.01
+        pattern, sheet, fold_law=law, crease_rest=rest, crease_stiffness=0.01, **bars
     )
     held = [fd.Fix([4, 5]), fd.Fix([0, 1], "z")]
     return fd.Case(structure, held, [fd.Force([0, 1], (-1e-3, 0.0, 0.0))])

@@ -26,13 +26,13 @@ def write(tmp_path, monkeypatch):
     """Function that computes a case file and writes its page without a film."""
     monkeypatch.setattr("foldyn.analyses.modes.FRAMES", 2)
 
-    def write_page(text: str):
+    def write_page(text: str, figures: str | None = "png"):
         file = tmp_path / "case.toml"
         model = "" if "[model]" in text else PLATE
         file.write_text(SHEET + model + text, "utf-8")
         case_file = read_case(file)
         results = {rule: case_file.run(rule) for rule in case_file.masses}
-        page = case_file.analysis.page(case_file, results, tmp_path, figures="png")
+        page = case_file.analysis.page(case_file, results, tmp_path, figures=figures)
         return next(iter(results.values())), page.read_text("utf-8")
 
     return write_page
@@ -51,7 +51,8 @@ def test_modes_about_an_equilibrium(write):
 
 @pytest.mark.matrix
 def test_which_modes_are_shown(write):
-    found, _ = write('[analysis]\nkind = "modes"\ncount = 5\nsecant = 1\n[output]\nshapes = [2]\n')
+    asked = '[analysis]\nkind = "modes"\ncount = 5\nsecant = 1\n[output]\nshapes = [2]\n'
+    found, _ = write(asked, figures=None)
     assert chosen_modes(found, 3) == [1, 2, 3]
     assert chosen_modes(found, (4, 2)) == [4, 2]
     found["rigid"][:2] = True
@@ -96,7 +97,8 @@ def test_a_drive_backward_is_read_backward(write):
 @pytest.mark.matrix
 def test_what_the_picture_marks_is_in_the_table(write):
     """A peak of 1 % of the highest one, which a logarithmic axis shows as well."""
-    found, _ = write(PUSH + '[analysis]\nkind = "frf"\nfrequencies = [0.5, 1, 2]\nsecant = 1\n')
+    asked = '[analysis]\nkind = "frf"\nfrequencies = [0.5, 1, 2]\nsecant = 1\n'
+    found, _ = write(PUSH + asked, figures=None)
     f = np.linspace(1.0, 10.0, 901)
     curve = sum(
         size / (f0**2 - f**2 + 2j * 0.01 * f0 * f) for size, f0 in ((1.0, 3.0), (0.04, 6.0))
@@ -116,7 +118,7 @@ def test_what_the_picture_marks_is_in_the_table(write):
 @pytest.mark.matrix
 def test_numbers_that_are_missing_are_explained(write):
     """A curve that ends above the half-power points tells no damping."""
-    only, _ = write('[analysis]\nkind = "modes"\ncount = 1\nsecant = 1\n')
+    only, _ = write('[analysis]\nkind = "modes"\ncount = 1\nsecant = 1\n', figures=None)
     f0 = float(only["frequency"][0])
     lines = [round(share * f0, 6) for share in (0.87, 0.96, 1.05)]
     text = f'[analysis]\nkind = "frf"\nfrequencies = {lines}\nsecant = 1\n[output]\nnodes = 13\n'
@@ -138,5 +140,5 @@ def test_a_response_that_depends_on_its_amplitude(write):
     largest = np.degrees(np.nanmax(found["swing"]))
     assert f"the largest is {largest:.3g} degrees" in page
     assert '<th scope="col" class="number">amplitude</th>' in page
-    _, linear = write(PUSH + f'[analysis]\nkind = "frf"\n{grid}secant = 1\n')
+    _, linear = write(PUSH + f'[analysis]\nkind = "frf"\n{grid}secant = 1\n', figures=None)
     assert ">amplitude</th>" not in linear

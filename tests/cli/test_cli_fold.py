@@ -43,7 +43,12 @@ def test_a_pattern_is_folded_by_a_fraction(workplace, flap) -> None:
 
 
 @pytest.mark.matrix
-def test_the_page_shows_the_way_and_a_film_only_where_it_is_asked_for(workplace, flap) -> None:
+def test_the_page_shows_the_way_and_a_film_only_where_it_is_asked_for(
+    workplace, flap, monkeypatch
+) -> None:
+    """A film of a few pictures, as films have tests of their own."""
+    draw = fd.plots.animate_folding
+    monkeypatch.setattr(fd.plots, "animate_folding", lambda *of: draw(*of, frames=3))
     told = workplace.call("fold", flap, "--to", "50%", "--steps", "2", "--film", "gif")
     assert told.new == ["flap-folded.fold", "flap-folded.gif", "flap-folded.html"]
     page = Path("flap-folded.html").read_text()

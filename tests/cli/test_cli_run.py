@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from processes import ended, start
 
 import foldyn as fd
 from case_texts import changed
@@ -148,14 +147,6 @@ def test_modes_that_cannot_be_compared_are_no_failure(workplace) -> None:
     """Some models of the paper's fold have modes that superelements lack."""
     run = workplace.call("modes", "herkal/case1", "--no-figures")
     assert run.status == 0, run.err
-
-
-@pytest.mark.matrix
-def test_the_module_runs_as_a_command(tmp_path, miura) -> None:
-    (tmp_path / "case.toml").write_text(miura)
-    status, _, err = ended(start(tmp_path, "run", "case.toml", "--no-figures"))
-    assert (status, err) == (0, "")
-    assert fd.load(tmp_path / "case-results" / "result.nc").sizes["time"] == 11
 
 
 @pytest.mark.matrix

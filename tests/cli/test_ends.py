@@ -1,4 +1,4 @@
-"""Runs that are killed, interrupted, out of space, or two at once: each in a real process."""
+"""Runs that are killed, interrupted, out of space, or two at once: in real processes."""
 
 from __future__ import annotations
 
@@ -9,6 +9,8 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -28,31 +30,36 @@ def names(folder: Path) -> list[str]:
     return sorted(path.name for path in folder.iterdir())
 
 
-def limited(size: int):
-    """Function that limits the size of the files that a process can write (bytes)."""
-    return lambda: resource.setrlimit(resource.RLIMIT_FSIZE, (size, size))
+@contextmanager
+def limited(size: int) -> Iterator[None]:
+    """Limit the size of the files that this process can write (bytes)."""
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
 
 
 @pytest.mark.matrix
-def test_signals_keep_what_was_computed_and_of_two_at_once_one_runs(tmp_path, edited) -> None:
-    (tmp_path / "case.toml").write_text(edited(""))
-    fd.read_case(tmp_path / "case.toml").run()  # compiles, which would take each of them minutes
-    (tmp_path / "case.toml").write_text(edited(LONG))
+def test_signals_keep_what_was_computed_and_of_two_at_once_one_runs(
+    workplace, tmp_path, edited
+) -> None:
+    workplace.write(edited(""))
+    fd.read_case("case.toml").run()  # compiles, which would take each of them minutes
+    workplace.write(edited(LONG))
     run = ("run", "case.toml", "--no-figures")
-    others = {signal.SIGHUP: "other"}
+    others = {signal.SIGHUP: "other", signal.SIGTERM: "case-results"}
     ignored = signal.signal(signal.SIGHUP, signal.SIG_DFL)  # which nohup lets processes ignore
     runs = {signal.SIGHUP: start(tmp_path, *run, "--out", "other")}
     signal.signal(signal.SIGHUP, ignored)
-    both = [start(tmp_path, *run) for _ in range(2)]
-    wait_for(lambda: sum(one.poll() is None for one in both) == 1)
-    (refused,) = [one for one in both if one.poll() is not None]
-    status, out, err = ended(refused)
-    assert (status, out) == (2, "")
-    assert "foldyn: results folder case-results: another run writes to it (process" in err
-    (runs[signal.SIGTERM],) = [one for one in both if one is not refused]
-    others[signal.SIGTERM] = "case-results"
+    runs[signal.SIGTERM] = start(tmp_path, *run)
     for one in runs.values():
         wait_for_line(one, "13 nodes")
+    assert main(run) == 2
+    out, err = workplace.capsys.readouterr()
+    writes = f"another run writes to it (process {runs[signal.SIGTERM].pid}"
+    assert out == "" and f"foldyn: results folder case-results: {writes}" in err
     time.sleep(2.0)  # until both motions have begun, on a busy machine too
     for number, one in runs.items():
         one.send_signal(number)
@@ -93,10 +100,6 @@ def test_a_kill_between_rules_leaves_no_old_result(workplace, tmp_path, edited) 
 def test_ctrl_c_and_a_full_disk_while_figures_are_drawn(workplace, tmp_path, edited) -> None:
     workplace.run(edited("output.interval = 0.001"), "--out", "before")  # compiles
     stopped = start(tmp_path, "run", "case.toml", "--out", "stopped", "--figures", "png")
-    full = start(
-        tmp_path, "run", "case.toml", "--out", "full", "--figures", "png",
-        preexec_fn=limited(120_000),
-    )  # fmt: skip
     wait_for_line(stopped, "drawing figures")  # takes some seconds from here on
     stopped.send_signal(signal.SIGINT)
     status, _, err = ended(stopped)
@@ -104,9 +107,10 @@ def test_ctrl_c_and_a_full_disk_while_figures_are_drawn(workplace, tmp_path, edi
         130,
         f"foldyn: interrupted while figures were drawn\n{KEPT}stopped/result.nc\n",
     )
-    status, _, err = ended(full)
-    assert status == 1
-    reason, kept = err.splitlines()[-2:]
+    with limited(120_000):
+        full = workplace.call("run", "case.toml", "--out", "full", "--figures", "png")
+    assert full.status == 1
+    reason, kept = full.err.splitlines()[-2:]
     assert reason.startswith("foldyn: case.toml: figures: ")
     assert "File too large" in reason
     assert kept == f"{KEPT}full/result.nc"
@@ -132,16 +136,15 @@ def test_exit_status_of_an_interrupt_within_code_made_from_text(tmp_path) -> Non
 
 
 @pytest.mark.matrix
-def test_no_room_for_the_result(workplace, tmp_path, miura) -> None:
+def test_no_room_for_the_result(workplace, miura) -> None:
     """Neither HDF5 nor the interpreter falls over, and nothing cut stays."""
     workplace.run(miura, "--out", "before")  # compiles
-    run = start(tmp_path, "run", "case.toml", "--no-figures", preexec_fn=limited(20_000))
-    status, _, err = ended(run)
-    assert status == 1
-    (line,) = err.splitlines()
+    with limited(20_000):
+        done = workplace.call("run", "case.toml", "--no-figures")
+    assert (done.status, done.new) == (1, [])
+    (line,) = done.err.splitlines()
     assert line.startswith("foldyn: case-results/result.nc: cannot be written (File too large)")
     assert "nor can a temporary folder" in line and "--out" in line
-    assert not (tmp_path / "case-results").exists()
 
 
 @pytest.mark.matrix

@@ -13,6 +13,7 @@ import pytest
 from processes import ended, start
 
 import foldyn as fd
+from foldyn.cli.main import main
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="streams and names of POSIX")
 ODD = b"f\xffall"
@@ -64,7 +65,7 @@ def test_streams_that_are_closed_or_full(tmp_path, miura) -> None:
 
 
 @pytest.mark.matrix
-def test_a_working_folder_that_is_gone(tmp_path, miura) -> None:
+def test_a_working_folder_that_is_gone(tmp_path, miura, monkeypatch, capsys) -> None:
     (tmp_path / "case.toml").write_text(miura)
     gone = tmp_path / "gone"
 
@@ -75,8 +76,11 @@ def test_a_working_folder_that_is_gone(tmp_path, miura) -> None:
 
     case, out = str(tmp_path / "case.toml"), str(tmp_path / "r")
     there = start(tmp_path, "run", case, "--no-figures", "--out", out, preexec_fn=leave)
-    assert ended(there)[0] == 0
-    nowhere = start(tmp_path, "run", case, "--no-figures", preexec_fn=leave)
-    status, _, err = ended(nowhere)
-    assert status == 2
+    status, _, err = ended(there)
+    assert (status, err) == (0, "")
+    assert result_of(os.fsencode(out)) == 11
+    monkeypatch.chdir(tmp_path)  # and back at the end
+    leave()
+    assert main(["run", case, "--no-figures"]) == 2
+    err = capsys.readouterr().err
     assert err.startswith("foldyn: results folder case-results: cannot be written (No such file")

@@ -12,12 +12,6 @@ from foldyn.cli.first_uses import STAGES, use
 from foldyn.dynamics import METHODS
 from pairwise import FEW
 
-ALONE = """
-from foldyn.cli.first_uses import use
-from foldyn.dynamics import METHODS
-use("bars and hinges")
-print(*(name for name, method in METHODS.items() if method.loop.overloads))
-"""
 ASKED = """
 import sys
 from foldyn.jit.kernel_cache import Kept
@@ -33,8 +27,11 @@ sys.path.insert(0, sys.argv[1])
 """
 THEN = """
 from foldyn.cli.first_uses import STAGES, use
+from foldyn.dynamics import METHODS
 import reference
 
+use("bars and hinges")
+print(*(name for name, method in METHODS.items() if method.loop.overloads))
 for stage in STAGES:
     for name in stage:
         use(name)
@@ -55,16 +52,6 @@ def test_what_is_there_is_not_compiled_again(workplace, monkeypatch) -> None:
     assert told.out.startswith("all kernels are ready (")
 
 
-@pytest.mark.matrix
-def test_a_run_compiles_its_own_method_alone() -> None:
-    """Loaded or compiled: no other method's loop is there."""
-    told = subprocess.run(
-        [sys.executable, "-c", ALONE], capture_output=True, text=True, check=True, timeout=500
-    )
-    loop = METHODS["rk4"].loop
-    assert told.stdout.split() == [name for name, one in METHODS.items() if one.loop is loop]
-
-
 def test_names_are_unique() -> None:
     names = [name for stage in STAGES for name in stage]
     assert len({*names}) == len(names)
@@ -73,11 +60,17 @@ def test_names_are_unique() -> None:
 
 
 @pytest.mark.matrix
-def test_other_cases_ask_for_no_kernel_that_is_not_compiled() -> None:
-    """Whichever of them are on disk: after `warm-up`, a part of the references asks for none."""
+def test_kernels_are_compiled_where_they_are_used_and_all_of_them_by_warm_up() -> None:
+    """Whichever of them are on disk.
+
+    A run compiles or loads the loop of no other method than its own; after `warm-up`, a part of
+    the references asks for no kernel.
+    """
     each = "75" if FEW else "25"
     command = [sys.executable, "-W", "ignore", "-c", ASKED + THEN, str(BENCHMARKS), each]
     told = subprocess.run(command, capture_output=True, text=True, check=True)
-    compiled, others, *more = told.stdout.splitlines()
+    methods, compiled, others, *more = told.stdout.splitlines()
+    loop = METHODS["rk4"].loop
+    assert methods.split() == [name for name, one in METHODS.items() if one.loop is loop]
     assert int(compiled) > 100 and int(others) > (7 if FEW else 20)
     assert not more

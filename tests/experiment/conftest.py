@@ -26,7 +26,7 @@ def sharp(tmp_path_factory):
     from foldyn.experiment import write_film
 
     path = tmp_path_factory.mktemp("film") / "sharp.mkv"
-    film = make_film(80, dropped=(30,))
+    film = make_film(80, dropped=(30,), samples=4)
     write_film(film, path)
     return Scene(path, film, film.truth(), model())
 

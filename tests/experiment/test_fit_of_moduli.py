@@ -21,7 +21,7 @@ density = 1600
 direction = 0
 [model]
 kind = "superelements"
-divisions = 8
+divisions = 4
 [analysis]
 kind = "modes"
 count = 14

@@ -17,7 +17,7 @@ PLACED = Tracking(placing=Placing(metres_per_pixel=SCALE, distance=DISTANCE))
 @pytest.fixture(scope="module")
 def photos(tmp_path_factory):
     folder = tmp_path_factory.mktemp("photos")
-    studio = Studio.of(folded(75.0), camera(), Look(), Sensor(samples=8, read_noise=1.0), 2)
+    studio = Studio.of(folded(75.0), camera(), Look(), Sensor(samples=4, read_noise=1.0), 2)
     states = moving_states(DIHEDRALS)
     paths = []
     for k, state in enumerate(states):

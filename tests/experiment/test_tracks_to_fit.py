@@ -99,7 +99,7 @@ def filmed(tmp_path_factory):
     motion = fd.simulate(case, **arguments)
     seen = camera(model.rest, k1=0.0)
     film = film_of(
-        motion, seen, rate=RATE, duration=0.16, sensor=Sensor(samples=8), dropped=(DROPPED,)
+        motion, seen, rate=RATE, duration=0.16, sensor=Sensor(samples=4), dropped=(DROPPED,)
     )
     write_film(film, folder / "film.mkv")
     tracks = track_film(str(folder / "film.mkv"), model, tracking=HOW)
@@ -117,7 +117,7 @@ def photographed(tmp_path_factory):
     steps = [int(np.argmin(np.abs(bent["load_factor"].values - f))) for f in FACTORS]
     model = TrackedModel.of(bent)
     seen = camera(model.rest, k1=0.0)
-    pictures, _ = photos_of(bent, steps, camera=seen, sensor=Sensor(samples=8))
+    pictures, _ = photos_of(bent, steps, camera=seen, sensor=Sensor(samples=4))
     files = [folder / f"load{k}.png" for k in range(len(FACTORS))]
     for file, picture in zip(files, pictures, strict=True):
         cv2.imwrite(str(file), picture)

@@ -11,7 +11,7 @@ from foldyn.patterns.topology import edge_lookup
 from pairwise import FEW, beyond
 from verification.fidelity import mixed_models
 from verification.fidelity.compare import NEAR, RESULTS, read
-from verification.fidelity.mixed import KINDS, LARGE, SETS, SUPPORTS, mixed, quads
+from verification.fidelity.mixed import KINDS, LARGE, SETS, SUPPORTS, quads
 from verification.fidelity.references import (
     case_sets,
     certain,
@@ -24,7 +24,7 @@ from verification.fidelity.references import (
 
 @pytest.fixture(scope="module")
 def sets():
-    return {name: mixed(name) for name in SETS}
+    return {name: case_sets()[name] for name in SETS}
 
 
 @pytest.mark.matrix

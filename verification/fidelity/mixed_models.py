@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 import sys
 from collections.abc import Sequence
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -30,6 +31,7 @@ BESIDE = {
 }
 
 
+@cache
 def references(name: str, folder: Path = compare.RESULTS) -> list[tuple[MixedCase, Stored]]:
     """Stored cases of a set, with their modes."""
     lines, cases = read_references(name, folder), case_sets()[name]

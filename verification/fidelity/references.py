@@ -18,6 +18,7 @@ import time
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from itertools import zip_longest
 from pathlib import Path
 from typing import Any
@@ -82,6 +83,7 @@ class Stored:
         return seen, self.shape[:, place[seen]]
 
 
+@cache
 def case_sets() -> dict[str, Sequence[MixedCase]]:
     """Sets of cases with stored shells, by file name."""
     return {**{name: mixed(name) for name in SETS}, "gaps": gaps()}
