@@ -45,10 +45,11 @@ def on_panels(case: Case, kind: type[Pressure] | type[Temperature]) -> list[Shar
 
 def moments(case: Case) -> list[Share]:
     """Moments of whole creases, a `Share` for each load."""
-    return [
-        Share(*load.of_creases(case.structure, place), load.history)
-        for place, load in case.loads_of(CreaseMoment)
-    ]
+    found = []
+    for place, load in case.loads_of(CreaseMoment):
+        creases, moment = load.of_creases(case.structure, place)
+        found.append(Share(creases, moment, load.history))
+    return found
 
 
 def panel_middles(structure: Discretized, points: Points, share: Share) -> Points:
