@@ -157,8 +157,8 @@ def period(case: fd.Case) -> float:
     return 2 * speed / G + (math.pi + 2 * math.atan(sag * rate / speed)) / rate
 
 
-def test_a_cable_that_goes_slack_and_taut_fifty_times_keeps_the_energy(slack_case):
-    case, bounces = slack_case, 25
+def test_a_cable_that_goes_slack_and_taut_many_times_keeps_the_energy(slack_case):
+    case, bounces = slack_case, 12
     motion = fd.simulate(
         case, bounces * period(case), method="dormand_prince", interval=1e-2, tolerance=1e-8
     )
@@ -172,7 +172,7 @@ def test_a_cable_that_goes_slack_and_taut_fifty_times_keeps_the_energy(slack_cas
 @pytest.mark.parametrize("method", [name for name in METHODS if name != "dormand_prince"])
 def test_energy_errors_of_bounces_shrink_with_the_step(slack_case, method):
     """Explicit steps end where the cable goes slack or taut, which keeps the order of a method."""
-    end = 2.0 * period(slack_case)
+    end = period(slack_case)
     error = []
     for dt in (1e-3, 2.5e-4):
         given = {"dt": dt} if METHODS[method].implicit else {"dt": 0.2 * dt}
@@ -194,7 +194,7 @@ def winding() -> fd.Case:
 @pytest.mark.parametrize("method", METHODS)
 def test_a_winch_lifts_a_weight_and_its_work_is_booked(method):
     case = winding()
-    given = {} if method == "dormand_prince" else {"dt": 5e-4}
+    given = {} if method == "dormand_prince" else {"dt": 1e-3}
     motion = fd.simulate(case, 1.0, method=method, interval=0.05, **given)
     assert motion.attrs["energy_error"] < 1e-4
     lifted = float(motion.displacement[-1, 0, 2])

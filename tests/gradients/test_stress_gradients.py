@@ -21,8 +21,8 @@ def strip(model: str, thickness: float, width: float = 0.1) -> fd.Case:
     """A clamped strip without creases under a force at its end."""
     pattern = fd.Pattern([[0, 0, 0], [1, 0, 0], [1, width, 0], [0, width, 0]], [(0, 1, 2, 3)])
     sheet = fd.Sheet(7e10, 0.0, thickness, 2700.0, strength=1e8)
-    make = fd.shell if model == "shell" else fd.superelements
-    structure = make(pattern, sheet, divisions=8, clamped=[(0, 3)])
+    make, divisions = (fd.shell, 4) if model == "shell" else (fd.superelements, 8)
+    structure = make(pattern, sheet, divisions=divisions, clamped=[(0, 3)])
     push = fd.Force([1, 2], (0.0, 0.0, -1e-3))
     return fd.Case(structure, [fd.Fix([0, 3], "xyz")], [push])
 
@@ -51,8 +51,8 @@ def folded(model: str, thickness: float, stiffness: Any, panel_angle: float = 62
     pattern = fd.patterns.miura(cells=(1, 1), panel_angle=panel_angle, dihedral=110)
     sheet = fd.Sheet(1e8, 0.3, thickness, 1000.0, strength=1e5)
     make: Any = {
-        "shell": partial(fd.shell, divisions=4),
-        "superelements": partial(fd.superelements, level=2, divisions=8),
+        "shell": partial(fd.shell, divisions=2),
+        "superelements": partial(fd.superelements, level=1, divisions=4),
     }.get(model, partial(fd.discretize, preset=model))
     structure = make(pattern, sheet, crease_stiffness=stiffness)
     push = fd.Force([int(pattern.vertices[:, 0].argmax())], (0.0, 1e-3, -5e-3))
