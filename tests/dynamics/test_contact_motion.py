@@ -127,7 +127,7 @@ def test_it_crosses_itself_without_contact_or_without_the_limit_of_steps(monkeyp
     pytest.importorskip("ipctk")
     case = folded_from_both_ends(None)
     with pytest.raises(PenetrationError) as passed:
-        fd.simulate(case, 0.25, method="rk4", interval=2e-3)
+        fd.simulate(case, 0.35, method="rk4", interval=2e-3)
     assert crossing(case.structure, passed.value.partial.displacement.values) > 0
 
     # the tower is where it matters: impacts at some m/s
@@ -263,7 +263,7 @@ def test_without_friction_a_sheet_slides_as_it_falls():
 
 @pytest.mark.matrix
 @pytest.mark.parametrize(
-    ("method", "dt", "error"), [("rk4", None, 1e-3), (ALPHA, 2e-5, 1e-3), (CONSERVING, 4e-5, 1e-9)]
+    ("method", "dt", "error"), [("rk4", None, 1e-3), (ALPHA, 1e-5, 1e-3), (CONSERVING, 4e-5, 1e-9)]
 )
 def test_a_moving_plane_does_the_work_that_it_gives(method, dt, error):
     up = fd.Ramp(0.01, smooth=True)
