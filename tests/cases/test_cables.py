@@ -157,8 +157,8 @@ def period(case: fd.Case) -> float:
     return 2 * speed / G + (math.pi + 2 * math.atan(sag * rate / speed)) / rate
 
 
-def test_a_cable_that_goes_slack_and_taut_many_times_keeps_the_energy(slack_case):
-    case, bounces = slack_case, 12
+def test_a_cable_that_goes_slack_and_taut_fifty_times_keeps_the_energy(slack_case):
+    case, bounces = slack_case, 25
     motion = fd.simulate(
         case, bounces * period(case), method="dormand_prince", interval=1e-2, tolerance=1e-8
     )

@@ -72,7 +72,9 @@ def test_constant_loads_shift_the_state_about_which_it_vibrates(miura):
 
 @pytest.fixture(scope="module")
 def resonant():
-    return fd.backbone(oscillator(), amplitudes=(0.01, 1.8), harmonics=9, damped=True, longest_step=0.4)
+    return fd.backbone(
+        oscillator(), amplitudes=(0.01, 1.8), harmonics=9, damped=True, longest_step=0.4
+    )
 
 
 def test_resonance_without_damping_is_refused():

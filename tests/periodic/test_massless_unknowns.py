@@ -55,7 +55,7 @@ def fine(count):
 def test_harmonics_and_shooting_find_the_same_motion(damping):
     case = fold(damping=damping)
     one = fd.periodic_motion(case, harmonics=9)
-    two = fd.periodic_motion(case, method="shooting", steps=24)
+    two = fd.periodic_motion(case, method="shooting", steps=32)
     assert difference(one, two) < 3.0 * one.attrs["truncation"] + 1e-6
 
 
@@ -176,7 +176,7 @@ def test_the_exponent_of_a_motion_is_that_of_its_multipliers():
     case = fold(damping=fd.Rayleigh(alpha=0.05, beta=0.002))
     one = fd.periodic_motion(case, harmonics=9)
     start = fd.State(one.displacement.values[0], one.velocity.values[0])
-    found = fd.lyapunov_exponent(case, 12.0 / F, settle=8.0 / F, initial=start)
+    found = fd.lyapunov_exponent(case, 24.0 / F, settle=16.0 / F, initial=start)
     rate = F * np.log(np.abs(one.floquet.values[0]))
     assert rate < -0.03  # alpha alone: -0.025
     assert float(found.exponent) == pytest.approx(rate, rel=0.05)

@@ -122,7 +122,7 @@ def test_a_strip_folded_onto_itself_rests_as_bars_and_hinges_do():
     pytest.importorskip("ipctk")
     push, ends = [], []
     plates = fd.discretize(strip().pattern, SHEET, scheme="n5b8e", fold_law="linear")
-    for structure in (strip(), plates, strip_shell(divisions=3)):
+    for structure in (strip(), plates, strip_shell()):
         case, path = folded(structure)
         assert path.attrs["crossing_samples"] == 0
         assert crossing(structure, path.displacement.values) == 0
@@ -170,7 +170,7 @@ def lying(angle: float, friction: float, alpha: float = 0.0) -> fd.Case:
 @pytest.mark.matrix
 def test_a_shell_slides_above_the_angle_of_friction():
     case, a = lying(20.0, 0.3), np.radians(20.0)
-    run = fd.simulate(case, 0.1, method="generalized_alpha", dt=4e-4, interval=2e-3)
+    run = fd.simulate(case, 0.1, method="generalized_alpha", dt=2e-4, interval=2e-3)
     distance = run.displacement.values[-1, :, 0].mean()
     expected = 0.5 * G * (np.sin(a) - 0.3 * np.cos(a)) * 0.1**2
     assert distance == pytest.approx(expected, rel=0.02)
@@ -182,7 +182,7 @@ def test_a_shell_slides_above_the_angle_of_friction():
 @pytest.mark.matrix
 def test_a_shell_sticks_below_the_angle_of_friction():
     case = lying(15.0, 0.3, alpha=200.0)
-    run = fd.simulate(case, 0.2, method="generalized_alpha", dt=4e-4, interval=2e-3)
+    run = fd.simulate(case, 0.2, method="generalized_alpha", dt=2e-4, interval=2e-3)
     along = run.displacement.values[:, :, 0].mean(axis=1)
     assert abs(along[-1] - along[60]) < 1e-12
     assert along[-1] < 1e-3 and run.attrs["energy_error"] < 1e-2

@@ -191,12 +191,12 @@ def test_the_energy_of_a_rough_press_closes(cycles):
 @pytest.mark.matrix
 def test_friction_converges_with_the_steps_of_a_path():
     case = rough(0.3)
-    ways = [np.linspace(0.0, 0.3, steps + 1) for steps in (4, 8, 16)]
+    ways = [np.linspace(0.0, 0.3, steps + 1) for steps in (8, 16, 32)]
     paths = [fd.trace(case, "newton", load_factors=way) for way in ways]
     ends = [plates(case, path)[0][-1] for path in paths]
     coarse, fine = np.abs(np.diff(ends))
     assert 0.7 < np.log2(coarse / fine) < 1.5  # first order: backward Euler
-    assert fine < 2e-4 * ends[-1]
+    assert fine < 1e-4 * ends[-1]
     free = fd.trace(case, "arc_length", load_factors=[0.0, 0.3], first_step=0.02)
     assert plates(case, free)[0][-1] == pytest.approx(ends[-1], rel=2e-3)
     # nothing of a path is left in its case
