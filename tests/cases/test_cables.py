@@ -194,7 +194,7 @@ def winding() -> fd.Case:
 @pytest.mark.parametrize("method", METHODS)
 def test_a_winch_lifts_a_weight_and_its_work_is_booked(method):
     case = winding()
-    given = {} if method == "dormand_prince" else {"dt": 1e-3}
+    given = {} if method == "dormand_prince" else {"dt": 5e-4}
     motion = fd.simulate(case, 1.0, method=method, interval=0.05, **given)
     assert motion.attrs["energy_error"] < 1e-4
     lifted = float(motion.displacement[-1, 0, 2])
