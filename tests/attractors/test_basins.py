@@ -29,7 +29,7 @@ def basins(case: fd.Case, side: np.ndarray, **more):
         case,
         lambda x, v: at(case, x, v),
         grid={"x": side, "v": side},
-        duration=100.0,
+        duration=60.0,
         dt=0.05,
         **more,
     )
@@ -37,7 +37,7 @@ def basins(case: fd.Case, side: np.ndarray, **more):
 
 @pytest.fixture(scope="module")
 def found(cell):
-    return basins(cell, np.linspace(-1.9, 1.9, 20))
+    return basins(cell, np.linspace(-1.4, 1.4, 14))
 
 
 @pytest.mark.matrix
@@ -81,7 +81,7 @@ def test_the_boundary_is_the_stable_manifold_of_the_saddle(cell):
 
 @pytest.mark.matrix
 def test_a_finer_grid_moves_the_boundary_by_less_than_a_cell(cell, found):
-    fine = basins(cell, np.linspace(-1.9, 1.9, 39)).basin.values
+    fine = basins(cell, np.linspace(-1.4, 1.4, 27)).basin.values
     coarse = found.basin.values
     np.testing.assert_array_equal(fine[::2, ::2], coarse)
     between = fine[1::2, 1::2]  # the middle of each cell

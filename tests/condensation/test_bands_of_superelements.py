@@ -36,7 +36,7 @@ def small(pattern=MIURA, supports=(), masses=(), vectors=None, screw=None, level
 
 
 def assert_those_of_shells(
-    pattern, phases, divisions=8, vectors=None, screw=None, supports=(), sheet=SHEET, count=6,
+    pattern, phases, divisions=4, vectors=None, screw=None, supports=(), sheet=SHEET, count=6,
     **options,
 ):  # fmt: skip
     own = fd.superelements(pattern, sheet, divisions=divisions, **options)
@@ -55,7 +55,7 @@ def assert_those_of_shells(
 
 @pytest.mark.matrix
 def test_bands_of_a_sector_of_a_ring_are_those_of_the_shell():
-    assert_those_of_shells(SIDE, [(0.0,), (2.0,)], 4, screw=RING, count=4)
+    assert_those_of_shells(SIDE, [(0.0,), (2.0,)], screw=RING, count=4)
 
 
 @pytest.mark.matrix
@@ -69,13 +69,11 @@ def test_bands_of_a_chain_on_supports_are_those_of_the_shell(options):
 def test_the_gap_of_the_gallery_is_that_of_the_shell():
     sheet = fd.Sheet(3e9, 0.3, thickness=2.4e-4, density=1200.0, length_scale_ratio=10.0)
     pattern = fd.patterns.miura(a=0.03, b=0.03, panel_angle=60, dihedral=60)
-    of_both = assert_those_of_shells(pattern, [(0.0, np.pi), (0.0, 0.63)], sheet=sheet)
-    own, shell = (
-        (each["frequency"].values[:, 3].max(), each["frequency"].values[:, 4].min())
-        for each in of_both
-    )
-    np.testing.assert_allclose(own, shell, rtol=0.01)
-    assert 495.0 < shell[0] < 505.0 and 540.0 < shell[1] < 550.0
+    edges = [(0.0, np.pi), (0.0, 0.63)]  # of the bands below and above it
+    assert_those_of_shells(pattern, edges, sheet=sheet)
+    fine = fd.UnitCell(fd.Case(fd.superelements(pattern, sheet, divisions=8)))
+    values = frequencies(fine, edges, 5)
+    assert 495.0 < values[:, 3].max() < 505.0 and 540.0 < values[:, 4].min() < 550.0
 
 
 @pytest.mark.matrix
@@ -90,7 +88,8 @@ def test_bands_of_a_miura_sheet_are_those_of_the_shell():
 
 @pytest.mark.matrix
 def test_bands_of_a_tower_are_those_of_the_shell():
-    assert_those_of_shells(TOWER, [(0.5,), (2.0,)])
+    tower = fd.patterns.kresling(sides=3, radius=0.03, height=0.03)
+    assert_those_of_shells(tower, [(0.5,), (2.0,)])
 
 
 @pytest.mark.matrix
@@ -184,8 +183,8 @@ def test_damped_creases_damp_and_attenuate_as_in_shells():
     for make in (fd.superelements, fd.shell):
         case = fd.Case(make(SIDE, SHEET, **options), damping=fd.CreaseDamping(1e-4))
         cell = fd.UnitCell(case, screw=RING)
-        damped = fd.linear.damped_bands(cell, [(1.3,)], count=4)
-        decay = fd.linear.attenuation(cell, [350.0, 800.0])["attenuation"]
+        damped = fd.linear.damped_bands(cell, [(1.3,)], count=3)
+        decay = fd.linear.attenuation(cell, [800.0])["attenuation"]
         found.append(np.concatenate([np.ravel(damped["rate"]), decay]))
     np.testing.assert_allclose(*found, rtol=0.015)
 

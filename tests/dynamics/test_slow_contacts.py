@@ -111,19 +111,21 @@ def test_a_tower_that_is_pressed_flat_takes_few_steps():
 
 @pytest.mark.matrix
 def test_a_tower_that_rattles_takes_few_steps_that_conserve():
-    """With little damping, which leaves `dormand_prince` most of the steps.
+    """It snaps shut, bounces twice and is pressed flat, while its panels rattle.
 
-    Where each contact is resolved (beta = 0.25) it takes 118,226, and the top comes down by
-    59.4106 mm; it still rattles a bit.
+    It takes 1,501 steps, of 5 us in the mean; contact asks explicit methods for steps down to
+    0.03 us. Numbers of steps of a rattling motion differ from processor to processor, hence the
+    factor of two; and its top still shakes by 0.2 mm about where it will rest.
     """
     pytest.importorskip("ipctk")
-    case = tower(38.0, fd.Contact(), fd.Ramp(0.005, smooth=True), alpha=400.0)
-    run = fd.simulate(case, 0.04, method="energy_momentum", interval=1e-3)
+    case = tower(38.0, fd.Contact(), fd.Ramp(0.002, smooth=True), alpha=2000.0)
+    run = fd.simulate(case, 8e-3, method="energy_momentum", interval=5e-4)
     u = run.displacement.values
-    assert run.attrs["steps"] < 118_226 / 10
+    assert run.attrs["steps"] < 2 * 1_501
     assert run.attrs["energy_error"] < 1e-9
     assert crossing(case.structure, u) == 0
-    assert u[-1, 6:12, 2].mean() == pytest.approx(-59.4106e-3, rel=1e-3)
+    assert u[-1, 6:12, 2].mean() == pytest.approx(-59.4141e-3, abs=2e-4)
+    assert float(run.contact[-1]) > 0.01
 
 
 @pytest.mark.matrix

@@ -51,8 +51,8 @@ def folded(model: str, thickness: float, stiffness: Any, panel_angle: float = 62
     pattern = fd.patterns.miura(cells=(1, 1), panel_angle=panel_angle, dihedral=110)
     sheet = fd.Sheet(1e8, 0.3, thickness, 1000.0, strength=1e5)
     make: Any = {
-        "shell": partial(fd.shell, divisions=4),
-        "superelements": partial(fd.superelements, level=2, divisions=8),
+        "shell": partial(fd.shell, divisions=2),
+        "superelements": partial(fd.superelements, level=1, divisions=4),
     }.get(model, partial(fd.discretize, preset=model))
     structure = make(pattern, sheet, crease_stiffness=stiffness)
     push = fd.Force([int(pattern.vertices[:, 0].argmax())], (0.0, 1e-3, -5e-3))

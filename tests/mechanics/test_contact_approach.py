@@ -163,15 +163,14 @@ DT = 1e-4
 @shared
 def two_steps(tables, u, v, angle, lightness, memory, force):
     """The first force, two steps' limits, and the forces after them; returns limits and powers."""
-    add_contact(tables, u[0], angle[0], force[0], memory)
-    one = limited(tables, u[0], v, v, angle[0], DT, RESOLVED, lightness, memory)
-    wait(memory.share.team)
-    add_contact(tables, u[1], angle[1], force[1], memory)
-    other = limited(tables, u[1], v, v, angle[1], DT, RESOLVED, lightness, memory)
-    wait(memory.share.team)
-    add_contact(tables, u[2], angle[2], force[2], memory)
+    limits = np.zeros(2)
+    for k in range(3):  # one call of each: what is called twice is compiled twice
+        add_contact(tables, u[k], angle[k], force[k], memory)
+        if k < 2:
+            limits[k] = limited(tables, u[k], v, v, angle[k], DT, RESOLVED, lightness, memory)
+            wait(memory.share.team)
     work, dissipated = plane_powers(tables, v, memory)
-    return one, other, work, dissipated
+    return limits[0], limits[1], work, dissipated
 
 
 def moved(count: int, growth: float):

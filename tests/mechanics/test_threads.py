@@ -36,21 +36,19 @@ LAWS = {
 
 
 @shared
-def evaluate(model, u, force, work):
-    """The force as threads compute it: called from a function that has let go of Python's lock."""
-    mechanics.internal_force(model, u, force, work)
+def again_and_again(model, u, force, work, times, step):
+    """Evaluations that would read what is being written, did the threads not wait.
 
-
-@shared
-def again_and_again(model, u, force, work, times):
-    """Evaluations that would read what is being written, did the threads not wait."""
+    The force as threads compute it: called from a function that has let go of Python's lock. In
+    between every thread moves its own nodes by a step along the force.
+    """
     model, work = borrowed(model), borrowed(work)
     first, last = work.strips.own[0], work.strips.own[1]
     for _ in range(times):
         mechanics.internal_force(model, u, force, work)
         for i in range(first, last):
             for c in range(3):
-                u[i, c] -= 1e-5 * force[i, c]
+                u[i, c] -= step * force[i, c]
         wait(work.team)
 
 
@@ -72,8 +70,8 @@ def alone(model, u):
 
 def together(model, u, works):
     out = np.full_like(u, np.nan)
-    arguments = [(model, u, out, work) for work in works]
-    run_together(evaluate, [work.team for work in works], arguments)
+    arguments = [(model, u, out, work, 1, 0.0) for work in works]
+    run_together(again_and_again, [work.team for work in works], arguments)
     return out
 
 
@@ -120,7 +118,7 @@ def test_evaluations_in_a_compiled_loop_do_not_overtake_each_other():
     ends = []
     for count in (1, 2, 2, 3):
         works, moved, force = mechanics.force_scratches(model, count), u.copy(), np.empty_like(u)
-        arguments = [(model, moved, force, work, 200) for work in works]
+        arguments = [(model, moved, force, work, 200, 1e-5) for work in works]
         run_together(again_and_again, [work.team for work in works], arguments)
         ends.append(moved)
     assert relative(ends[0], u) > 0.1

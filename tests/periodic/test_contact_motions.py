@@ -45,7 +45,7 @@ def test_what_does_not_reach_the_plane_does_not_feel_it():
 
 @pytest.mark.matrix
 def test_harmonics_converge_to_what_shooting_finds(found):
-    shot = fd.periodic_motion(bouncing(), method="shooting", steps=96, guess=found[-1])
+    shot = fd.periodic_motion(bouncing(), method="shooting", steps=48, guess=found[-1])
     errors = [np.abs(height(one) - height(shot)).max() for one in found]
     assert height(shot).min() < -0.09  # deep in what touches, of which 0.05 is 0
     assert all(after < 0.25 * before for before, after in pairwise(errors))

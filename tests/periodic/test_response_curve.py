@@ -18,7 +18,9 @@ FEW = {"longest_step": 0.2, "steps": 16}  # where multipliers are not what is te
 
 @pytest.fixture(scope="module")
 def curve():
-    return fd.response_curve(oscillator(), frequencies=(0.1, 0.6), harmonics=13, steps=32)
+    return fd.response_curve(
+        oscillator(), frequencies=(0.1, 0.6), harmonics=13, steps=32, longest_step=0.25
+    )
 
 
 def marked(curve, name):
@@ -115,7 +117,7 @@ def test_curve_of_small_motions_is_the_linear_response():
 @pytest.mark.matrix
 def test_curve_along_the_amplitude_meets_that_along_the_frequency(curve):
     at = oscillator(frequency=0.3)
-    along = fd.response_curve(at, amplitudes=(0.2, 4.0), harmonics=13, steps=32)
+    along = fd.response_curve(at, amplitudes=(0.2, 4.0), harmonics=7, **FEW)
     assert marked(along, "fold").sizes["point"] == 2
     assert along.frequency.values == pytest.approx(0.3)
     assert along.level.values[[0, -1]] == pytest.approx([0.2, 4.0])
@@ -124,7 +126,7 @@ def test_curve_along_the_amplitude_meets_that_along_the_frequency(curve):
         {
             round(float(np.abs(one.displacement.values).max()), 8)
             for near in _beside(line, of, value)
-            for one in [fd.periodic_motion(at, guess=near, harmonics=13)]
+            for one in [fd.periodic_motion(at, guess=near, harmonics=7, steps=16)]
         }
         for line, of, value in ((along, along.level, 1.0), (curve, curve.frequency, 0.3))
     ]
@@ -141,8 +143,8 @@ def _beside(curve, of, value):
 @pytest.fixture(scope="module")
 def forked():
     return fd.response_curve(
-        oscillator(force=8.0, alpha=0.2), frequencies=(0.18, 0.23), harmonics=9, longest_step=0.3,
-        steps=32,
+        oscillator(force=8.0, alpha=0.2), frequencies=(0.18, 0.23), harmonics=7, longest_step=0.5,
+        steps=16,
     )  # fmt: skip
 
 

@@ -85,7 +85,7 @@ def end_moment(s, rows, moment):
 def roll(nx, ny, length, angles):
     """States at end angles M L / (E I), and the strip."""
     s, number, rows = strip(nx, ny, length)
-    q, found, steps = at_rest(s), [], round(angles[-1] / (np.pi / 20))
+    q, found, steps = at_rest(s), [], round(angles[-1] / (np.pi / 12))
     for k in range(1, steps + 1):
         angle = angles[-1] * k / steps
         moment = end_moment(s, rows, -angle * EI / length)

