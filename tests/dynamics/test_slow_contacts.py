@@ -111,7 +111,7 @@ def test_a_tower_that_is_pressed_flat_takes_few_steps():
 
 @pytest.mark.matrix
 def test_a_tower_that_rattles_takes_few_steps_that_conserve():
-    """It snaps shut, bounces twice and is pressed flat, while its panels rattle.
+    """It snaps shut, bounces and is pressed flat, while its panels rattle.
 
     It takes 1,501 steps, of 5 us in the mean; contact asks explicit methods for steps down to
     0.03 us. Numbers of steps of a rattling motion differ from processor to processor, hence the
