@@ -47,7 +47,7 @@ class Lone(NamedTuple):
             return self._replace(term=DampingMatrix(matrix))
         model = _replaced(self.model, name.split("."), array)
         if isinstance(self.term, SheetTerm):
-            return self._replace(term=self.term._with(model))
+            return self._replace(term=self.term._with(**model._asdict()))
         others = (getattr(self.term, name) for name in ("rows", "first") if name in vars(self.term))
         return self._replace(term=type(self.term)(model, *others))
 
