@@ -76,6 +76,8 @@ class Formula(History):
 
     formulas: ClassVar[tuple[Waveform, ...]] = ()
     """One waveform for each code of the history; the first is the default."""
+    table: ClassVar[Callable[[History, NDArray], NDArray]]
+    """Factors and derivatives at times; set by `cases`, as `waveforms` imports all histories."""
 
     def __init_subclass__(cls, **options: Any) -> None:
         """Set the code of a class with formulas to the code of its first formula."""
@@ -89,10 +91,8 @@ class Formula(History):
 
     def derivatives(self, time: ArrayLike) -> NDArray[np.float64]:
         """Factor and its first and second derivative, shape (3, ...), at each time (s)."""
-        from foldyn.cases.waveforms import table  # imported late: it imports all histories
-
         times = np.asarray(time, dtype=np.float64)
-        return table(self, np.ascontiguousarray(times.ravel())).reshape((3, *times.shape))
+        return self.table(np.ascontiguousarray(times.ravel())).reshape((3, *times.shape))
 
 
 @inner_scalar
