@@ -199,6 +199,7 @@ def _draw_states(effective: xr.Dataset, title: str) -> Figure:
         axes.set_title(f"{words}{with_unit(own)}", fontsize="medium")
         if own.ndim > 1:
             axes.legend(fontsize="small")
+        axes.locator_params(axis="x", nbins=4)
         if k >= len(shown) - 2:
             axes.set_xlabel(f"{state.attrs['long_name']}{with_unit(state)}")
     for axes in figure.axes[len(shown) :]:
