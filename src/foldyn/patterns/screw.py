@@ -130,6 +130,13 @@ def _screw(axis: NDArray, angle: float, shift: float, point: NDArray) -> Screw:
         return Screw(tuple(axis.tolist()), math.degrees(angle), shift, tuple(point.tolist()))
 
 
+def closest_rotations(products: NDArray) -> NDArray[np.float64]:
+    """Rotations (k, 3, 3) that bring vectors b closest to a (Kabsch), for sums of a b^T."""
+    left, _, right = np.linalg.svd(products)
+    left[:, :, 2] *= np.sign(np.linalg.det(left @ right))[:, None]  # no reflections
+    return left @ right
+
+
 def motion_between(points: NDArray, images: NDArray, tolerance: float) -> tuple[Screw, NDArray]:
     """Motion from points (m, 3) to their images (m, 3), and the error of each image (m,), m.
 

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.errors import InputError
+from foldyn.patterns.screw import closest_rotations
 from foldyn.results.contents import case_of
 from foldyn.values import whole
 
@@ -69,10 +70,9 @@ def attitude(result: xr.Dataset, panel: int | None = None) -> xr.Dataset:
     spread = np.einsum("tni,tnj->tij", arm, _weighed(weight, arm))
     inertia = np.trace(spread, axis1=1, axis2=2)[:, None, None] * np.eye(3) - spread
     own = weight @ (rest - share @ rest)
-    left, _, right = np.linalg.svd(np.einsum("tni,nj->tij", arm, own))
-    left[:, :, 2] *= np.linalg.det(left @ right)[:, None]  # no reflections
+    rotations = closest_rotations(np.einsum("tni,nj->tij", arm, own))
     found = {
-        "rotation": (_rotation_vectors(left @ right), "rad", "rotation from rest"),
+        "rotation": (_rotation_vectors(rotations), "rad", "rotation from rest"),
         "angular_velocity": (
             np.linalg.solve(inertia, carried[..., None])[..., 0], "rad/s", "angular velocity",
         ),
@@ -106,11 +106,11 @@ def _weighed(weight: sparse.csr_array, vectors: NDArray) -> NDArray:
     return columns.reshape(count, -1, 3).transpose(1, 0, 2)
 
 
-def _rotation_vectors(turns: NDArray) -> NDArray[np.float64]:
-    """Rotation vectors (t, 3) of matrices (t, 3, 3), each with the angle closest to the last."""
+def _rotation_vectors(rotations: NDArray) -> NDArray[np.float64]:
+    """Rotation vectors (t, 3) of rotations (t, 3, 3), each with the angle closest to the last."""
     from scipy.spatial.transform import Rotation  # loads slowly
 
-    found = Rotation.from_matrix(turns).as_rotvec()
+    found = Rotation.from_matrix(rotations).as_rotvec()
     before = np.zeros(3)
     for k, vector in enumerate(found):
         angle = np.linalg.norm(vector)

@@ -23,6 +23,7 @@ from foldyn.condensation.library import ALIKE, Group
 from foldyn.condensation.panel import BOW, TURN, VERTEX, CondensedPanel
 from foldyn.condensation.resultants import held_resultants, in_own_axes
 from foldyn.errors import InputError
+from foldyn.patterns.screw import closest_rotations
 from foldyn.patterns.topology import around, edge_lookup, edge_of
 from foldyn.shells import Shell
 from foldyn.shells.recovery import StressPoints
@@ -332,9 +333,7 @@ def _moved(rest: NDArray, x: NDArray, kind: _Kind) -> tuple[NDArray, NDArray]:
     corners = kind.nodes.shape[1]
     before, after = (place[nodes] - place[kind.nodes].mean(axis=1)[:, None] for place in (rest, x))
     both = np.einsum("pki,pkj->pij", before[:, :corners], after[:, :corners])
-    left, _, right = np.linalg.svd(both)
-    left[:, :, 2] *= np.sign(np.linalg.det(left @ right))[:, None]
-    rotation = np.swapaxes(left @ right, 1, 2)  # from rest to now
+    rotation = np.swapaxes(closest_rotations(both), 1, 2)  # from rest to now
     local = np.einsum("pki,pij->pkj", after, rotation) - before
     local = np.einsum("pad,pkd->pka", kind.frames, local)
     local[..., :2] = _stretched(np.einsum("pad,pkd->pka", kind.frames, before), after, corners)
