@@ -18,7 +18,7 @@ import features
 import foldyn as fd
 from foldyn.analyses import ANALYSES, read_case
 from foldyn.cases import LOADS, SUPPORTS, BaseMotion, Force, Table
-from foldyn.cases.decode import law_from
+from foldyn.cases.decode import law_from, laws_from
 from foldyn.cli.main import main
 from foldyn.tables import keys, table_under
 from named_models import named
@@ -166,9 +166,11 @@ def test_the_buckling_page_gives_eulers_loads_and_ten_more(capsys):
 
 
 def test_the_laws_page_shows_one_model_in_python_and_in_a_case_file():
-    (block,), (toml,) = blocks("laws.md", "python"), blocks("laws.md", "toml")
-    law = law_from(tomllib.loads(toml)["model"]["fold_law"], fd.materials.HINGE_LAWS)
-    assert law == executed(block)["law"]
+    python, toml = blocks("laws.md", "python"), blocks("laws.md", "toml")
+    first, second = (tomllib.loads(block)["model"]["fold_law"] for block in toml)
+    assert law_from(first, fd.materials.HINGE_LAWS) == executed(python[0])["law"]
+    laws = executed("\n".join(python))["laws"]
+    assert laws_from(second, fd.materials.HINGE_LAWS) == laws
 
 
 def test_the_path_of_the_case_file_page_can_be_followed(tmp_path):

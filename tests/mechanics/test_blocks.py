@@ -22,13 +22,13 @@ def random_model(bars, folds, bends, seed=0, fold_law=None, bend_law=None):
         chosen = [rng.choice(60, width, replace=False) for _ in range(count)]
         return np.array(chosen).reshape(-1, width)
 
-    def group(count, law):
+    def group(count, law, number):
         stiffness, rest = rng.uniform(0.5, 2, count), rng.uniform(1, 5, count)
-        return mechanics.Hinges(rows(count, 4), stiffness, rest, law)
+        return mechanics.Hinges(rows(count, 4), stiffness, rest, law, group=number)
 
     groups = (
-        group(folds, fold_law or EnhancedLinear()),
-        group(bends, bend_law or hinge_law("superlinear")),
+        group(folds, fold_law or EnhancedLinear(), 0),
+        group(bends, bend_law or hinge_law("superlinear"), 1),
     )
     unit = rng.uniform(0.5, 2, bars)
     return mechanics.build(nodes, rows(bars, 2), unit, bar_law("ogden"), groups)

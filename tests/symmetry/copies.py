@@ -202,7 +202,7 @@ class Copy:
     def per_crease(self, value: Any) -> Any:
         if np.ndim(value) == 0:
             return value
-        out = np.empty(len(self.crease))
+        out = np.empty(len(self.crease), object)
         out[self.crease] = value
         return out.tolist()
 
@@ -211,6 +211,10 @@ class Copy:
 
     def law(self, value: Any) -> Any:
         return value if isinstance(value, str) else self.part(value)
+
+    def laws(self, value: Any) -> Any:
+        several = isinstance(value, tuple | list)
+        return self.per_crease([*map(self.law, value)]) if several else self.law(value)
 
     def parts(self, value: Any) -> Any:
         return tuple(self.part(part) for part in value)
@@ -277,7 +281,8 @@ FIELDS: Mapping[str, Callable[[Copy, Any], Any]] = {
     "side": Copy.side,
     "crease_stiffness": Copy.per_crease,
     "crease_rest": Copy.rest_per_crease,
-    **dict.fromkeys(("law", "fold_law", "bend_law"), Copy.law),
+    **dict.fromkeys(("law", "bend_law"), Copy.law),
+    "fold_law": Copy.laws,
     **dict.fromkeys(("Sheet.panels", "planes"), Copy.parts),
     # what no symmetry changes
     **dict.fromkeys(("history", "value", "axes", "axis", "name", "rest", "state"), Copy.same),

@@ -302,7 +302,7 @@ def structure_of(model: str, pattern: fd.Pattern, rng, extra: str) -> Any:
     laws = [law for law in HINGE_LAWS.values() if issubclass(law, MemoryLaw) == memory]
     count = len(pattern.creases)
     options: dict[str, Callable[[], Any]] = {
-        "fold_law": lambda: drawn(scene, laws),
+        "fold_law": lambda: fold_laws(scene, laws, count),
         "bend_law": lambda: drawn(scene, laws),
         "scheme": lambda: str(rng.choice(["n5b8", "n4b5"])),
         "bar_law": lambda: str(rng.choice([*BAR_LAWS])),
@@ -333,6 +333,14 @@ def structure_of(model: str, pattern: fd.Pattern, rng, extra: str) -> Any:
             except InputError:
                 pass
     return s
+
+
+def fold_laws(scene: Scene, laws: Sequence[Any], count: int) -> Any:
+    """A law for all of some creases, or one of two for each."""
+    two = drawn(scene, laws), drawn(scene, laws)
+    return (
+        two[0] if scene.rng.random() < 0.5 else [two[k] for k in scene.rng.integers(2, size=count)]
+    )
 
 
 def scene_of(structure: Any, rng, implicit: bool) -> Scene:

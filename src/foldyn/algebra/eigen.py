@@ -104,7 +104,9 @@ class Pencil:
         """Norm of K phi - lambda M phi relative to both terms (k,); nan for shapes of zeros."""
         inertia = (self.mass @ shapes) * values
         terms = np.linalg.norm(self._sizes @ np.abs(shapes), axis=0)
-        return np.linalg.norm(self.stiffness @ shapes - inertia, axis=0) / terms
+        left = np.linalg.norm(self.stiffness @ shapes - inertia, axis=0)
+        free = np.where(shapes.any(axis=0), 0.0, np.nan)  # of motions without any stiffness
+        return np.divide(left, terms, out=free, where=terms > 0.0)
 
 
 @dataclass(frozen=True)

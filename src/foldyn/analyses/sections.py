@@ -16,7 +16,7 @@ from foldyn.arguments import Check, Placed, arguments
 from foldyn.cases.air import Air
 from foldyn.cases.contact import Contact
 from foldyn.cases.damping import DampingSection
-from foldyn.cases.decode import KindOf, law_from
+from foldyn.cases.decode import KindOf, law_from, laws_from
 from foldyn.cases.directions import AXES, check_pairs
 from foldyn.cases.loads import LOAD
 from foldyn.cases.masses import MASS
@@ -177,6 +177,7 @@ Whole = Annotated[int, Check(whole_number, least=-MOST)]
 Seed = Annotated[int, Check(whole_number, least=0)]
 Vector = Annotated[Sequence[float] | None, Check(vector)]
 HingeLaw = Annotated[Any, KindOf(law_from, HINGE_LAWS, named=True, laws=HINGE_LAWS)]
+FoldLaws = Annotated[Any, KindOf(laws_from, HINGE_LAWS, named=True, several=True, laws=HINGE_LAWS)]
 BarLaw = Annotated[Any, KindOf(law_from, BAR_LAWS, named=True, laws=BAR_LAWS)]
 PerCrease = Annotated[float | Sequence[float] | Mapping[str, float] | None, Check(_per_crease)]
 Folds = Annotated[float | Sequence[float] | Mapping[str, Any] | None, Check(_folds)]
@@ -220,7 +221,7 @@ class ModelSection(Section):
     divisions: Count | None = None
     mass: Annotated[str | Sequence[str] | None, Check(_masses, words=RULES)] = None
     bar_law: BarLaw = None
-    fold_law: HingeLaw = None
+    fold_law: FoldLaws = None
     bend_law: HingeLaw = None
     calibration: Annotated[str | None, one_of(CALIBRATIONS)] = None
     crease_stiffness: Folds = None

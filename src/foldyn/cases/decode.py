@@ -57,6 +57,21 @@ def law_from(spec: Any, laws: Mapping[str, type]) -> Any:
     return call_from(laws[kind], arguments, ("name",))
 
 
+def laws_from(spec: Any, laws: Mapping[str, type]) -> Any:
+    """One law as in `law_from`, a list of laws, or laws by name, as ``{valley = "linear"}``."""
+    if isinstance(spec, list):
+        return [_within(f"[{k}]", own, laws) for k, own in enumerate(spec)]
+    named = isinstance(spec, Mapping) and "kind" not in spec
+    if named and all(isinstance(own, str | Mapping) for own in spec.values()):
+        return {word: _within(f".{word}", own, laws) for word, own in spec.items()}
+    return law_from(spec, laws)
+
+
+def _within(place: str, spec: Any, laws: Mapping[str, type]) -> Any:
+    with within(place):
+        return law_from(spec, laws)
+
+
 def call_from(
     function: Callable[..., Any], arguments: Mapping[str, Any], skip: Iterable[str] = ()
 ) -> Any:
@@ -123,10 +138,11 @@ class KindOf(Placed):
     """A table whose `kind` is the name of one of several data classes, or just that name."""
 
     def __init__(
-        self, read: Callable[..., Any], kinds: Mapping[str, Any], named: bool, **limits: Any
-    ) -> None:
+        self, read: Callable[..., Any], kinds: Mapping[str, Any], named: bool,
+        several: bool = False, **limits: Any,
+    ) -> None:  # fmt: skip
         super().__init__(read, **limits)
-        self.kinds, self.named = kinds, named
+        self.kinds, self.named, self.several = kinds, named, several
 
     def schema(self, hint: Any, definitions: dict[str, Schema]) -> Schema:
         """See `Check`."""
@@ -135,7 +151,9 @@ class KindOf(Placed):
         ]
         if Table in self.kinds.values():
             tables.append(of_call(Table.from_csv, Table.kind, {}))
-        return any_of([*([{"enum": [*self.kinds]}] if self.named else []), *tables])
+        one = any_of([*([{"enum": [*self.kinds]}] if self.named else []), *tables])
+        lists = {"type": "array", "items": one}, {"type": "object", "additionalProperties": one}
+        return any_of([one, *lists]) if self.several else one
 
 
 Factor = Annotated[

@@ -21,7 +21,7 @@ from foldyn.cases.air import Air
 from foldyn.cases.case import Case
 from foldyn.cases.contact import Contact
 from foldyn.cases.damping import DampingSection, damping_table
-from foldyn.cases.decode import law_from
+from foldyn.cases.decode import laws_from
 from foldyn.cases.histories import HISTORIES, Table
 from foldyn.cases.history import STEADY, History, as_history
 from foldyn.cases.loads import LOAD, Load
@@ -249,6 +249,10 @@ class _Writer:
     def _law(self, name: str, law: Any) -> Any:
         if isinstance(law, str):
             return law
+        if isinstance(law, Mapping):
+            return {word: self._law(name, own) for word, own in law.items()}
+        if isinstance(law, tuple):
+            return [self._law(name, own) for own in law]
         kind = next((kind for kind, built_in in LAWS[name].items() if type(law) is built_in), None)
         if kind is None:
             self.obstacles.append(
@@ -323,7 +327,7 @@ def _structure(sections: Mapping[str, Any]) -> Any:
     model = dict(sections["model"])
     for name, laws in LAWS.items():
         if name in model:
-            model[name] = law_from(model[name], laws)
+            model[name] = laws_from(model[name], laws)
     nodes = sections["nodes"]
     with quietly():
         pattern = _stored_pattern(sections["pattern"])

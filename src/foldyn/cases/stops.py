@@ -25,7 +25,6 @@ from foldyn.errors import InputError
 from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.jit.context import Context, numbers_at, rows_at
 from foldyn.jit.intrinsics import flat
-from foldyn.materials.inelastic_law import memory_of
 from foldyn.mechanics.dihedral import add_hessian, dihedrals_and_gradients, gradient_at
 from foldyn.mechanics.discrete_gradient import discrete_gradient, put_motion
 from foldyn.mechanics.model import ranks
@@ -338,8 +337,7 @@ def on_hinges(part: Any, structure: Discretized, place: str) -> OnHinges:
     row = np.flatnonzero(np.isin(folds.fold, creases))
     fold, soft = folds.fold[row], folds.softness[row]
     crease = folds.stiffness[row] / (1.0 - soft * folds.stiffness[row])  # without its panels
-    memory = memory_of(structure.fold_law)
-    law, at = structure.fold_law if memory is None else memory.elastic, angles[fold]
+    law, at = structure.fold_law.elastic.at(fold), angles[fold]
     slope = crease * law.slope(at, folds.rest[row])
     own = part.stiffness * folds.length[row]
     share = 1.0 / (1.0 + soft * (slope + own))

@@ -21,8 +21,7 @@ from foldyn.condensation.resultants import resultants
 from foldyn.condensation.shapes import FOR_BUCKLING, FOR_STRESSES, LEVELS, Level
 from foldyn.condensation.term import GROUPS, SuperelementsTerm
 from foldyn.errors import InputError
-from foldyn.materials import EnhancedLinear, HingeLaw, Superlinear, hinge_law
-from foldyn.materials.inelastic_law import memory_of
+from foldyn.materials import EnhancedLinear, Superlinear
 from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.following import Following
 from foldyn.mechanics.sheet_term import NO_DOF, CreaseTurns, FoldHinges
@@ -34,6 +33,7 @@ from foldyn.shells.shell import LEAST, PER_DOUBLING
 from foldyn.structures import MASS_RULES, Sheet, calibration
 from foldyn.structures.discretize import checked_kinds
 from foldyn.structures.discretized import Discretized, Distributed, read_only
+from foldyn.structures.fold_law import FoldLaws, laws_given
 from foldyn.structures.graded import grading
 from foldyn.structures.held_edges import boundary_edges
 from foldyn.structures.material_axes import material_axes
@@ -53,7 +53,7 @@ class SuperelementsOptions:
     level: int = 5
     divisions: int | None = None
     mass: str = "consistent"
-    fold_law: str | HingeLaw = EnhancedLinear()
+    fold_law: FoldLaws = EnhancedLinear()
     crease_stiffness: calibration.Folds = None
     crease_rest: calibration.PerCrease = None
     clamped: tuple[Edge, ...] = ()
@@ -309,25 +309,21 @@ class Superelements(Discretized):
     @property
     def slope(self) -> NDArray:
         """Stiffness of the folds at rest, N m/rad."""
-        law = _elastic(self.fold_law)
+        law = self.fold_law.elastic
         return self.fold_stiffness * law.slope(self.pattern.dihedrals, self.fold_rest)
 
 
-def _elastic(law: HingeLaw) -> HingeLaw:
-    """The law without its memory."""
-    memory = memory_of(law)
-    return law if memory is None else memory.elastic
-
-
-def _check_law(given: str | HingeLaw) -> None:
-    """Refuse a law of creases without a slope at rest."""
-    law = hinge_law(given, "fold_law")
-    if isinstance(_elastic(law), Superlinear):
-        raise InputError(
-            f' = {law.name!r}: has no slope at rest, which superelements need; take "linear" or '
-            '"enhanced"',
-            "fold_law",
-        )
+def _checked_law(given: Any) -> Any:
+    """Laws of creases, each with a slope at rest; see `laws_given`."""
+    given, laws = laws_given(given)
+    for law in laws:
+        if isinstance(law.elastic, Superlinear):
+            raise InputError(
+                f" = {law.name!r}: has no slope at rest, which superelements need; take "
+                '"linear" or "enhanced"',
+                "fold_law",
+            )
+    return given
 
 
 def superelements(
@@ -337,7 +333,7 @@ def superelements(
     level: int = 5,
     divisions: int | None = None,
     mass: str = "consistent",
-    fold_law: str | HingeLaw = EnhancedLinear(),
+    fold_law: FoldLaws = EnhancedLinear(),
     crease_stiffness: calibration.Folds = None,
     crease_rest: calibration.PerCrease = None,
     clamped: str | Sequence[Sequence[int]] = (),
@@ -390,7 +386,7 @@ def superelements(
     level = whole("level", level, least=1, most=len(LEVELS))
     if divisions is not None:
         divisions = whole("divisions", divisions, least=4)
-    _check_law(fold_law)
+    fold_law = _checked_law(fold_law)
     calibration.check_sheet(sheet, pattern)
     if sheet.density is None:
         raise InputError("sheet: density is missing: give it (kg/m3), the panels' mass needs it")

@@ -26,7 +26,7 @@ def with_memory(case: Case, body: Assembly, by: Numbering) -> Assembly:
     case.check_flow()
     state = memory_of_case(case)
     hinges = {"fold": body.sheet.fold_hinges, "bend": body.sheet.bend_hinges}
-    row = np.concatenate([hinges[p.kind]().row[... if p.rows is None else p.rows] for p in parts])
+    row = np.concatenate([hinges[p.kind]().row[p.rows] for p in parts])
     own = state.own._replace(dofs=by.dofs(state.own.dofs), row=row)
     return body.with_terms(HingeMemory(own, state.settles, body.sheet))
 

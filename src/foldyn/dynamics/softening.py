@@ -37,12 +37,12 @@ def lost_stiffness(case: Case) -> NDArray:
     out = np.zeros(len(hidden))
     if not len(hidden) or not (there := (hinges := case.body.sheet.fold_hinges()).alone).any():
         return out
-    law, corners = case.structure.fold_law, hinges.corners.reshape(-1, 3)
+    law, corners = case.structure.fold_law.at(hinges.fold), hinges.corners.reshape(-1, 3)
     angle = angles(corners, np.arange(len(corners), dtype=np.uint32).reshape(-1, 4))
     slope = np.maximum(law.slope(angle, hinges.rest), 1.0)
     for part in case.remembering:
         if part.kind == "fold":
-            slope += sum(branch.relaxed + branch.share for branch in part.branches)
+            slope[part.rows] += sum(branch.relaxed + branch.share for branch in part.branches)
     slope -= law.least_slope(hinges.rest, hinges.stiffness, hinges.length)
     own = np.searchsorted(hidden, hinges.hidden[there, 0])
     out[own] = (hinges.stiffness * slope * hinges.hidden_turn.sum(axis=1) ** 2)[there]

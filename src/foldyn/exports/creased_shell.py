@@ -19,7 +19,6 @@ from foldyn.cases import Case
 from foldyn.condensation import Superelements
 from foldyn.errors import InputError, warn
 from foldyn.linear.shell_of import check_reduced, shell_of
-from foldyn.materials import MemoryLaw
 from foldyn.patterns.topology import Lines, components
 from foldyn.shells import Shell
 from foldyn.structures import Sheet
@@ -237,7 +236,7 @@ def fold_slopes(structure: Discretized) -> NDArray:
         Folds that are not linear about rest.
     """
     law, rest = structure.fold_law, structure.fold_rest
-    if isinstance(law, MemoryLaw):
+    if law.elastic is not law:
         raise InputError(f" = {law}: springs have no memory; take its elastic part", "fold_law")
     slope, moment = law.slope(rest, rest), law.moment(rest, rest)
     if not (slope > 0.0).all() or np.abs(moment).max(initial=0.0) > 0.0:
@@ -246,7 +245,11 @@ def fold_slopes(structure: Discretized) -> NDArray:
             'take "linear" or "enhanced"',
             "fold_law",
         )
-    low, high = law.linear_between or (np.nan, np.nan)
+    low, high = law.each(
+        lambda own, rows: np.repeat(
+            np.reshape(own.linear_between or (np.nan, np.nan), (2, 1)), len(rest[rows]), axis=1
+        )
+    )
     curved = np.flatnonzero(~((low < rest) & (rest < high)))
     if len(curved):
         warn(

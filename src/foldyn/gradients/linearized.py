@@ -164,11 +164,10 @@ def refuse(linear: Linearized, what: str) -> None:
 def _way_to_kinks(sheet: SheetTerm, q: NDArray, motion: NDArray) -> float:
     """Least factor on a small motion (m,) at which a hinge reaches a kink or pole of its law."""
     way = np.inf
-    folds = sheet.fold_hinges()
-    for hinges, number in ((folds, 0), (sheet.bend_hinges(), len(np.unique(folds.fold)))):
+    for hinges, law in zip((sheet.fold_hinges(), sheet.bend_hinges()), sheet.laws, strict=False):
         if not len(hinges.row):
             continue
-        law, parameters = sheet.rest_law(number), sheet.folds.parameters[hinges.row]
+        parameters = sheet.folds.parameters[hinges.row]
         here, there = (_creased(sheet, hinges, law, at) for at in (q, q + motion))
         reach = np.maximum(law.reach(here, hinges.rest, parameters), NEAREST)
         with np.errstate(divide="ignore"):

@@ -39,13 +39,14 @@ from foldyn.linear.lattice import (
     plus,
 )
 from foldyn.linear.unit_cell import UnitCell, rotation
-from foldyn.materials.inelastic_law import memory_of
+from foldyn.materials import HingeLaw
 from foldyn.patterns import Pattern
 from foldyn.patterns.crease_data import ASSIGNED
 from foldyn.patterns.topology import around, edge_of
 from foldyn.shells import Shell
 from foldyn.structures import Sheet, Strip
 from foldyn.structures.discretized import Discretized
+from foldyn.structures.fold_law import OTHERS
 
 SAME_AXES = 1e-9  # tolerance for axes that a screw preserves
 
@@ -172,7 +173,7 @@ def _check(case: Case) -> None:
         )
     for name in ("fold_law", "bend_law"):
         law = getattr(structure, name, None)
-        if law is not None and memory_of(law) is not None:
+        if law is not None and law.elastic is not law:
             raise InputError(
                 f' = "{law.name}": has memory, so that its stiffness depends on the '
                 "frequency; take an elastic law",
@@ -187,7 +188,7 @@ def _structure(
     """The patch, discretized like the cell."""
     own = lattice.cell.case.structure
     options = {item.name: getattr(own.options, item.name) for item in fields(own.options)}
-    for name in ("crease_stiffness", "crease_rest"):
+    for name in ("crease_stiffness", "crease_rest", "fold_law"):
         options[name] = _per_crease(name, options[name], lattice, pattern, vertices)
     for name in ("clamped", "straight"):
         if options.get(name):
@@ -233,22 +234,23 @@ def _per_crease(
     name: str, given: Any, lattice: Lattice, pattern: Pattern, vertices: Sequence[Vertex]
 ) -> Any:
     """Values for the creases of the patch, from the values for the cell."""
-    if given is None or isinstance(given, float | Strip):
+    if given is None or isinstance(given, float | Strip | str | HingeLaw):
         return given
     seams, families = lattice.seams(), lattice.families()
     if isinstance(given, Mapping):
         lattice.refuse_letters(given, name)
-        words = [word for word in given if word not in ASSIGNED]
+        every = {*ASSIGNED, OTHERS}
+        words = [word for word in given if word not in every]
         named = set().union(*(families[word] for word in words))
         lost = [pair for pair in seams if lattice.edge(*pair).kind not in named]
-        if words and lost and not any(word in ASSIGNED for word in given):
+        if words and lost and not every & {*given}:
             raise InputError(
                 f": no name in it applies to the crease between cells at vertices {lost[0]}; "
                 'give values by letter too, as {"mountain": ..., "valley": ...}, or one for all',
                 name,
             )
         return {word: value for word, value in given.items()
-                if word in ASSIGNED or word in pattern.families}  # fmt: skip
+                if word in every or word in pattern.families}  # fmt: skip
     if seams:
         raise InputError(
             f": has no value for the crease between cells at vertices {seams[0]}; give values by "

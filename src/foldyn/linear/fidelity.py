@@ -326,7 +326,7 @@ def named(models: Any, structure: Discretized) -> Mapping[str, Mapping[str, Any]
     By default the models of `BESIDE` that accept the other options of the structure.
     """
     if models is None:
-        refused = isinstance(structure.fold_law, Superlinear)
+        refused = any(isinstance(law, Superlinear) for law, _ in structure.fold_law.parts)
         return {name: MODELS[name] for name in BESIDE if name != "n5b8e" or not refused}
     if isinstance(models, Mapping):
         for name, changes in models.items():

@@ -83,6 +83,11 @@ def branches_of(case: Case, q: NDArray, free: NDArray, dampers: bool = False) ->
         gradient = memory(parts, case.body).gradients(q, case.body.size)
         turns = CreaseTurns(gradient, np.arange(gradient.shape[0]))
     gradient, of = turns
+    if case.elastic_body.sheet.crease_turns is not None:  # of all folds, in their order
+        place, rows = np.full(len(case.structure.folds), -1), [part.rows for part in parts]
+        place[np.concatenate(rows)] = np.arange(sum(map(len, rows)))
+        remembers = place[of] >= 0
+        gradient, of = gradient[remembers], place[of[remembers]]
     if ties := case.constraints:
         gradient = sparse.csr_array(gradient @ ties.extended(gradient.shape[1]))
     most = max(len(part.branches) for part in parts)

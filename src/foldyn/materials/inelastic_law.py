@@ -54,7 +54,7 @@ class MemoryLaw(HingeLaw):
     """Whether the moment at a fixed angle relaxes to the moment of the elastic part."""
 
     @cached_property
-    def elastic(self) -> HingeLaw:
+    def elastic(self) -> HingeLaw:  # pyright: ignore[reportIncompatibleVariableOverride]
         """Elastic part of the law."""
         law = self.lookup(self.law, "law")
         if isinstance(law, MemoryLaw):
@@ -97,8 +97,3 @@ class MemoryLaw(HingeLaw):
                 'has none there; give law = "linear" or "enhanced"',
                 field,
             )
-
-
-def memory_of(law: Any) -> MemoryLaw | None:
-    """The law itself if it has memory, otherwise None."""
-    return law if isinstance(law, MemoryLaw) else None

@@ -93,6 +93,8 @@ class HingeLaw(Law):
     """Moment law of a hinge in terms of its dihedral (rad), per unit stiffness."""
 
     rest_state = (math.pi, math.pi)
+    elastic: Any = property(lambda self: self)
+    """The law without its memory."""
     linear_between: tuple[float, float] | None = None
     """Dihedrals (rad) between which the moment is k (theta - rest); None if nowhere."""
     follows_rest: bool = True
@@ -112,6 +114,19 @@ class HingeLaw(Law):
                 "no `follow`, which sets them as it turns",
                 field,
             )
+
+    @property
+    def parts(self) -> tuple[tuple[HingeLaw, Any], ...]:
+        """Laws of the hinges of a structure, each with the rows of its hinges."""
+        return ((self, slice(None)),)
+
+    def at(self, rows: Any) -> HingeLaw:
+        """Law of some of the hinges."""
+        return self
+
+    def each(self, of: Callable[[HingeLaw, Any], NDArray]) -> NDArray:
+        """Array (..., n) of the hinges, put together from those of all `parts`."""
+        return of(self, slice(None))
 
     def parameters(self, rest: NDArray) -> NDArray:
         """Parameters of the formulas (n, 4) for hinges with rest angles (n,)."""

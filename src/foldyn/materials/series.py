@@ -147,10 +147,17 @@ def in_series(
 
     theta, rest : dihedrals (rad); arrays that broadcast with the shares.
     """
+    arrays = np.broadcast_arrays(theta, rest, share)
+    rows = [np.atleast_1d(each) for each in arrays]
+    energy, moment = law.each(lambda own, here: _of_one(own, *(each[..., here] for each in rows)))
+    return energy.reshape(arrays[0].shape), moment.reshape(arrays[0].shape)
+
+
+def _of_one(law: HingeLaw, *arrays: NDArray) -> NDArray:
+    """Energies and moments (2, ...) of hinges of one law; see `in_series`."""
     # copies: read-only arrays would compile the table again
-    arrays = [np.array(each, float, order="C") for each in np.broadcast_arrays(theta, rest, share)]
-    flat, at_rest, part = (each.ravel() for each in arrays)
+    flat, at_rest, part = (np.array(each, float, order="C").ravel() for each in arrays)
     parameters = np.ascontiguousarray(law.parameters(at_rest))
     address = np.array(law.addresses or (0, 0, 0), np.int64)
-    energy, moment = _table(law.code, flat, at_rest, parameters, part, address)
-    return energy.reshape(arrays[0].shape), moment.reshape(arrays[0].shape)
+    table = _table(law.code, flat, at_rest, parameters, part, address)
+    return table.reshape((2, *arrays[0].shape))

@@ -56,11 +56,12 @@ OF_HINGES = (
 
 
 class Hinges(NamedTuple):
-    """Hinges of one group: rows (axis j, k, wings i, l), stiffness, rest angle and law.
+    """Hinges of one law: rows (axis j, k, wings i, l), stiffness, rest angle and law.
 
     parameters : (nh, 4) of each hinge, if they differ from the law's.
     share : (nh,) the crease's share of a turn (`materials.series`), if adjacent panels are
     compliant.
+    group : number of the energy to which they add.
     """
 
     nodes: NDArray
@@ -69,6 +70,7 @@ class Hinges(NamedTuple):
     law: HingeLaw
     parameters: NDArray | None = None
     share: NDArray | None = None
+    group: int = 0
 
 
 def element_order(nodes: NDArray) -> NDArray:
@@ -134,7 +136,7 @@ def build(
         ),
         hinge_share=gather(lambda k, g: np.ones(len(g.rest)) if g.share is None else g.share, -1),
         hinge_offset=np.zeros((start, 4)),
-        hinge_group=gather(lambda k, g: np.full(len(g.rest), k), -1, np.int64),
+        hinge_group=gather(lambda k, g: np.full(len(g.rest), g.group), -1, np.int64),
         hinge_runs=np.array(hinge_runs, np.int64).reshape(-1, 4),
         addresses=np.array(addresses or [(0, 0, 0)], np.int64),
     )

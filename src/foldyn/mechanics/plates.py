@@ -77,8 +77,8 @@ class BarsPlates(NamedTuple):
     fold_stiffness: NDArray  # (nf,) N m/rad
     fold_rest: NDArray  # (nf,) rad
     fold_parameters: NDArray  # (nf, 4)
-    code: int  # code of the folds' law
-    addresses: NDArray  # (3,) addresses of a user's law
+    code: NDArray  # (nf,) code of each fold's law
+    addresses: NDArray  # (nf, 3) addresses of users' laws
     bend_rest: NDArray  # (nb,) rad
     start: NDArray  # (p + 1,) first angle of each plate
     angle: NDArray  # (nq,) row in `hinges`, or -1 - number of a rotation
@@ -329,7 +329,7 @@ def fold_energy(model, f, angle):
     """Energy (J) of fold f at its angle."""
     rest, p = model.fold_rest[f], model.fold_parameters
     return model.fold_stiffness[f] * hinge_energy(
-        model.code, angle, rest, p[f, 0], p[f, 1], p[f, 2], p[f, 3], model.addresses[0],
+        model.code[f], angle, rest, p[f, 0], p[f, 1], p[f, 2], p[f, 3], model.addresses[f, 0],
     )  # fmt: skip
 
 
@@ -338,7 +338,7 @@ def fold_moment(model, f, angle):
     """Moment (N m) of fold f at its angle."""
     rest, p = model.fold_rest[f], model.fold_parameters
     return model.fold_stiffness[f] * hinge_moment(
-        model.code, angle, rest, p[f, 0], p[f, 1], p[f, 2], p[f, 3], model.addresses[1],
+        model.code[f], angle, rest, p[f, 0], p[f, 1], p[f, 2], p[f, 3], model.addresses[f, 1],
     )  # fmt: skip
 
 
@@ -347,7 +347,7 @@ def fold_slope(model, f, angle):
     """Slope of the moment of fold f at its angle, per unit of its stiffness."""
     rest, p = model.fold_rest[f], model.fold_parameters
     return hinge_slope(
-        model.code, angle, rest, p[f, 0], p[f, 1], p[f, 2], p[f, 3], model.addresses[2],
+        model.code[f], angle, rest, p[f, 0], p[f, 1], p[f, 2], p[f, 3], model.addresses[f, 2],
     )  # fmt: skip
 
 
@@ -511,8 +511,8 @@ def _mean_forces(own, u0, u1, before, h, t, force, powers):
     for f in range(model.fold_rest.size):
         angle = turned_fold(model, f, x0, began)
         scratch.moment[f] = model.fold_stiffness[f] * mean_moment(
-            model.code, model.addresses, model.fold_parameters[f], 1.0, model.fold_rest[f], angle,
-            scratch.fold_angle[f] - angle,
+            model.code[f], model.addresses[f], model.fold_parameters[f], 1.0, model.fold_rest[f],
+            angle, scratch.fold_angle[f] - angle,
         )[0]  # fmt: skip
         turn_rotations_beside(model, f, scratch.moment[f], couple)
     for p in range(model.start.size - 1):

@@ -106,8 +106,8 @@ def pull_folds(model, x, y, scratch, back, by_x):
     for f in range(model.fold_rest.size):
         stiffness, rate = model.fold_stiffness[f], turned_fold(model, f, y, back.rate)
         moment, slope, by_rest, by_a, by_b, by_c, _ = series_derivatives(
-            model.code, scratch.fold_angle[f], model.fold_rest[f],
-            p[f, 0], p[f, 1], p[f, 2], p[f, 3], 1.0, model.addresses,
+            model.code[f], scratch.fold_angle[f], model.fold_rest[f],
+            p[f, 0], p[f, 1], p[f, 2], p[f, 3], 1.0, model.addresses[f],
         )  # fmt: skip
         scratch.moment[f] = stiffness * moment
         back.moment[f] = stiffness * slope * rate

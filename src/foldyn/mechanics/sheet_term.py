@@ -170,6 +170,8 @@ class SheetTerm(Term):
         Number of folds with compliant panels: nf or 0.
     mass : (m, m) or None
         Mass of a linear sheet on all of its dofs, kg; None if nodes alone have mass.
+    laws : tuple of HingeLaw
+        Laws of `fold_hinges` and of `bend_hinges`.
     crease_turns : CreaseTurns or None
         Turns of the creases of a linear sheet.
     rotated : ndarray or None
@@ -184,6 +186,7 @@ class SheetTerm(Term):
     per_hidden: float = 0.0
     offsets: int = 0
     mass: sparse.csr_array | None = None
+    laws: Any = ()
     crease_turns: CreaseTurns | None = None
     rotated: NDArray | None = None
     shared = True

@@ -210,8 +210,7 @@ def crease_values(
         twice = rows[chosen[rows]]
         if twice.size:
             raise InputError(
-                f" = {value:g}: crease {twice[0]} has a value by another name already; give each "
-                "crease one",
+                f": crease {twice[0]} has a value by another name already; give each crease one",
                 f"{field}.{word}",
             )
         values[rows], chosen[rows] = value, True

@@ -7,7 +7,6 @@ from collections import Counter
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.materials.inelastic_law import memory_of
 from foldyn.materials.series import in_series
 from foldyn.plots.charts import Chart, Curve
 from foldyn.shells import Shell
@@ -30,7 +29,8 @@ def law_charts(
     for the largest groups of hinges. Moments (N m) are of whole creases, dihedrals in degrees,
     stresses in Pa. The last curve of a chart marks the states at rest.
     """
-    charts = [_hinges(kind) for kind in structure.hinge_kinds if len(kind.nodes)]
+    kinds = [own for kind in structure.hinge_kinds for own in kind.by_law]
+    charts = [_hinges(kind) for kind in kinds if len(kind.nodes)]
     if structure.bar_law is not None:
         modulus, x = structure.sheet.youngs_modulus, np.linspace(*stretch, POINTS)
         y = modulus * np.asarray(structure.bar_law.stress(x))
@@ -67,8 +67,8 @@ def _hinges(hinges: HingeKind) -> Chart:
     hidden = len(groups) - MOST_CURVES
     note = f"{hidden} other pairs of k and rest not shown" if hidden > 0 else ""
     title = f"{kind}s: {hinges.law.name}"
-    if law := memory_of(hinges.law):
-        title += f" (its elastic part, {law.elastic.name})"
+    if (elastic := hinges.law.elastic) is not hinges.law:
+        title += f" (its elastic part, {elastic.name})"
     curves.append(_at_rest(states))
     labels = "dihedral (degrees)", "moment (N m)"
     return Chart(*labels, curves, title, note, 1.08 * reach, zero=True)

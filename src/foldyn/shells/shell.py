@@ -13,7 +13,7 @@ from scipy import sparse
 
 from foldyn.algebra.solvers import Fill
 from foldyn.errors import InputError
-from foldyn.materials import EnhancedLinear, HingeLaw, LinearBar, LinearHinge, hinge_law
+from foldyn.materials import EnhancedLinear, LinearBar, LinearHinge
 from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.following import joined, moments, pushes
 from foldyn.mechanics.membranes import Membranes
@@ -38,6 +38,7 @@ from foldyn.structures.beyond_range import doubt_locking
 from foldyn.structures.discretize import checked_kinds
 from foldyn.structures.discretized import Discretized, read_only
 from foldyn.structures.edge_angles import EdgePlates, plates_model
+from foldyn.structures.fold_law import FoldLaws, laws_given
 from foldyn.structures.graded import Grading, grading, smooth_vertices
 from foldyn.structures.held_edges import boundary_edges
 from foldyn.structures.material_axes import own_stretching
@@ -62,7 +63,7 @@ class ShellOptions:
 
     divisions: int = 16
     mass: str = "lumped"
-    fold_law: str | HingeLaw = EnhancedLinear()
+    fold_law: FoldLaws = EnhancedLinear()
     crease_stiffness: calibration.Folds = None
     crease_rest: calibration.PerCrease = None
     clamped: tuple[Edge, ...] = ()
@@ -140,7 +141,7 @@ class Shell(Discretized):
     @cached_property
     def body(self) -> Assembly:
         """The model for solvers."""
-        laws = self.fold_law, LinearHinge()
+        laws = self.fold_law.at(self.sides.piece_crease), LinearHinge()
         sheet = ShellTerm(self.model, laws, self.sides.piece_crease, self._scale)
         return Assembly(sheet, *(MembranesTerm(own, sheet.rows) for _, own in self.membranes))
 
@@ -262,8 +263,9 @@ class Shell(Discretized):
         whole = np.bincount(crease, length, len(self.fold_stiffness))
         model = plates_model(
             self.nodes, self.bars, np.ones(len(self.bars)), LinearBar(), folds,
-            (self.fold_stiffness / whole)[crease] * length, self.piece_rest, self.fold_law, bends,
-            hinge_angles(self.nodes, bends), self._plates[0], clamps[:, :3], self.by_folds,
+            (self.fold_stiffness / whole)[crease] * length, self.piece_rest,
+            self.fold_law.at(crease), bends, hinge_angles(self.nodes, bends), self._plates[0],
+            clamps[:, :3], self.by_folds,
         )  # fmt: skip
         return model._replace(bars=model.bars._replace(bar_runs=model.bars.bar_runs[:0]))
 
@@ -405,7 +407,7 @@ def shell(
     *,
     divisions: int = 16,
     mass: str | None = None,
-    fold_law: str | HingeLaw | None = None,
+    fold_law: FoldLaws | None = None,
     crease_stiffness: calibration.Folds = None,
     crease_rest: calibration.PerCrease = None,
     clamped: str | Sequence[Sequence[int]] = (),
@@ -464,8 +466,7 @@ def shell(
     radius = None if vertex_radius is None else length("vertex_radius", vertex_radius)
     divisions = whole("divisions", divisions, least=1)
     mass = ShellOptions.mass if mass is None else choice("mass", mass, MASSES)
-    law = ShellOptions.fold_law if fold_law is None else fold_law
-    hinge_law(law, "fold_law")
+    law, _ = laws_given(ShellOptions.fold_law if fold_law is None else fold_law)
     edges = boundary_edges(clamped, pattern, "clamped")
     plates = checked_panels(rigid, len(pattern.faces))
     check_welds(plates, pattern)

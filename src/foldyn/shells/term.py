@@ -50,7 +50,7 @@ class ShellTerm(BarsPlatesTerm):
     def _with(self, **arrays: Any) -> ShellTerm:
         """The sheet with other arrays on the same mesh."""
         model = self.model._replace(**arrays)
-        return ShellTerm(model, self._laws, self._crease, self._scale, self)
+        return ShellTerm(model, self.laws, self._crease, self._scale, self)
 
     def scale(self) -> NDArray:
         """See `SheetTerm`."""
@@ -63,6 +63,10 @@ class ShellTerm(BarsPlatesTerm):
     def rest_angles(self) -> NDArray:
         """See `SheetTerm`: rest angles of the folds, each the mean along its crease."""
         return np.bincount(self._crease, self.model.fold_rest) / np.bincount(self._crease)
+
+    def rest_law(self, number: int) -> HingeLaw:
+        """See `SheetTerm`."""
+        return self.laws[0].at([int(np.argmax(self._crease == number))])
 
     def fold_hinges(self) -> FoldHinges:
         """See `SheetTerm`: the pieces of the creases."""

@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from foldyn.cases import Case
 from foldyn.cases.case_assembly import SomeLoads
 from foldyn.condensation import Superelements
-from foldyn.materials.inelastic_law import memory_of
 from foldyn.materials.series import in_series
 from foldyn.mechanics import angles
 from foldyn.mechanics.assembly import Assembly
@@ -83,9 +82,7 @@ def crease_moments(structure: Discretized, body: Assembly, q: NDArray) -> NDArra
 
     q : (m,) dofs of `body`, whose folds may be actuated.
     """
-    law = structure.fold_law
-    memory = memory_of(law)
-    law, length = law if memory is None else memory.elastic, crease_lengths(structure)
+    law, length = structure.fold_law.elastic, crease_lengths(structure)
     sheet, hinges = body.sheet, body.sheet.fold_hinges()
     if isinstance(structure, Superelements):
         assert sheet.crease_turns is not None
@@ -103,6 +100,7 @@ def crease_moments(structure: Discretized, body: Assembly, q: NDArray) -> NDArra
     if sheet.offsets:
         theta = theta + sheet.rest_angles[-sheet.offsets :][hinges.fold]
     share = structure.hinge_kinds[0].share[hinges.fold]
+    law = law.at(hinges.fold)
     moment = hinges.stiffness * in_series(law, theta, hinges.rest, share)[1]
     return np.bincount(hinges.fold, moment, len(length)) / length
 

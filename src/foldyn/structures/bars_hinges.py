@@ -52,6 +52,7 @@ class BarsHingesTerm(SheetTerm):
         softness: NDArray, like: BarsHingesTerm | None = None,
     ) -> None:  # fmt: skip
         self.model, self._turning, self._laws, self._like = model, turning, laws, like
+        self.laws = tuple(law for law, _ in laws)
         self._softness, self.offsets = softness, len(softness) if softness.any() else 0
         self.size, self.rows = model.rest.size, len(model.rest)
 
@@ -198,7 +199,9 @@ class BarsHingesTerm(SheetTerm):
     def rest_law(self, number: int) -> HingeLaw:
         """Law of the hinge with a rest angle; see `SheetTerm`."""
         (folds, count), (bends, _) = self._laws
-        return bends if count <= number < len(self._turning) else folds
+        if count <= number < len(self._turning):
+            return bends
+        return folds.at([number if number < count else number - len(self._turning)])
 
     def fold_hinges(self) -> FoldHinges:
         """Hinges of the folds, one per fold; see `SheetTerm`."""

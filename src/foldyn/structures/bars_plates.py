@@ -61,7 +61,7 @@ class BarsPlatesTerm(SheetTerm):
     def __init__(
         self, model: BarsPlates, laws: tuple[HingeLaw, HingeLaw], like: BarsPlatesTerm | None = None
     ) -> None:
-        self.model, self._laws, self._like = model, laws, like
+        self.model, self.laws, self._like = model, laws, like
         self._nodal = 3 * model.nodes
         self.size, self.rows = self._nodal + model.rotations, model.rows
         self.hidden = np.arange(self._nodal, self.size)
@@ -72,7 +72,7 @@ class BarsPlatesTerm(SheetTerm):
 
     def _with(self, **arrays: Any) -> Self:
         """The sheet with other arrays of its model, whose elements keep their dofs."""
-        return type(self)(self.model._replace(**arrays), self._laws, self)
+        return type(self)(self.model._replace(**arrays), self.laws, self)
 
     def _split(self, q: NDArray) -> tuple[NDArray, NDArray]:
         """Displacements (n, 3) and rotations (r,)."""
@@ -148,7 +148,7 @@ class BarsPlatesTerm(SheetTerm):
     @property
     def _floor(self) -> float:
         """Least slope of the folds in Newton steps; slopes of a user's law may fall on purpose."""
-        return -np.inf if self.model.code < 0 else STEP_FLOOR
+        return -np.inf if (self.model.code < 0).any() else STEP_FLOOR
 
     def _assembled(
         self, q: NDArray, floor: float, bars: Callable[[], sparse.csr_array]
@@ -252,7 +252,7 @@ class BarsPlatesTerm(SheetTerm):
 
     def soft_hinges(self, q: NDArray) -> SoftHinges:
         """No hinges: the superlinear law is refused; see `SheetTerm`."""
-        if self.model.code == Superlinear.code:
+        if (self.model.code == Superlinear.code).any():
             raise InputError(
                 f' = "superlinear": {self._no_slope} frequency responses take "linear" or '
                 '"enhanced"',
@@ -268,7 +268,7 @@ class BarsPlatesTerm(SheetTerm):
 
     def rest_law(self, number: int) -> HingeLaw:
         """See `SheetTerm`."""
-        return self._laws[number >= len(self.model.fold_rest)]
+        return self.laws[1] if number >= len(self.model.fold_rest) else self.laws[0].at([number])
 
     def fold_hinges(self) -> FoldHinges:
         """See `SheetTerm`: one hinge per fold."""
@@ -287,7 +287,7 @@ class BarsPlatesTerm(SheetTerm):
     def folded(self, rest: NDArray) -> Self:
         """See `SheetTerm`."""
         folds = np.array(rest[: len(self.model.fold_rest)], float)
-        parameters, law = self.model.fold_parameters, self._laws[0]
+        parameters, law = self.model.fold_parameters, self.laws[0]
         if law.follows_rest:
             parameters = law.parameters(folds).reshape(-1, 4)
         bends = np.array(rest[len(folds) :], float)
@@ -330,7 +330,10 @@ class BarsPlatesTerm(SheetTerm):
         model, bars = self.model, self._bars.unstrained_model(q[: self._nodal])
         angle, folds = self.angles(q), len(model.fold_rest)
         sheet = self._with(
-            bars=bars, fold_rest=angle[:folds], bend_rest=angle[folds:], code=LinearHinge.code
+            bars=bars,
+            fold_rest=angle[:folds],
+            bend_rest=angle[folds:],
+            code=np.full_like(model.code, LinearHinge.code),
         )
         rest = np.zeros(self.size)
         return Unstrained(
@@ -387,7 +390,7 @@ class ClampsTerm(BarsPlatesTerm):
         """See `Term`."""
         bars = self.model.bars._replace(rest=self.model.bars.rest[order])
         hinges = ranks(order)[self.model.hinges]
-        return ClampsTerm(self.model._replace(bars=bars, hinges=hinges), self._laws)
+        return ClampsTerm(self.model._replace(bars=bars, hinges=hinges), self.laws)
 
     def nominal(self, q: NDArray) -> ClampsTerm:
         """See `Term`."""

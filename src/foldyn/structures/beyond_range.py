@@ -9,7 +9,7 @@ law of their hinge locks.
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from itertools import pairwise
 
 import numpy as np
@@ -20,6 +20,7 @@ from foldyn.materials import EnhancedLinear, HingeLaw
 from foldyn.patterns import Pattern
 from foldyn.patterns.topology import Lines
 from foldyn.structures.discretized import Discretized
+from foldyn.structures.fold_law import OTHERS
 from foldyn.structures.mesh import double_areas, lengths
 from foldyn.structures.rigid_plates import rigid_panels
 from foldyn.structures.sheet import Sheet
@@ -70,10 +71,13 @@ def far_turn(structure: Discretized, turn: float, where: str) -> str:
 
 def doubt_locking(structure: Discretized) -> None:
     """Warn of creases whose rest angle lies in the locking range of the default fold law."""
-    law, rest = structure.options.fold_law, structure.fold_rest
-    if law != EnhancedLinear() or not len(rest):
+    given, rest, default = structure.options.fold_law, structure.fold_rest, EnhancedLinear()
+    usual = given.get(OTHERS) if isinstance(given, Mapping) else given
+    if usual != default or not len(rest):
         return
-    stiffer = law.slope(rest, rest)
+    stiffer = structure.fold_law.each(
+        lambda own, rows: default.slope(rest[rows], rest[rows]) * float(own == default)
+    )
     k = int(stiffer.argmax())
     if stiffer[k] > LOCKING:
         how = (
@@ -253,7 +257,7 @@ BOUND = 1e3  # moment / k: at this angle, only an unbounded law exceeds it
 def locks(law: HingeLaw) -> bool:
     """Whether the moment of a law grows without bound as panels meet."""
     nearly = np.array([NEARLY, 2.0 * math.pi - NEARLY])
-    return bool((np.abs(law.moment(nearly, math.pi)) > BOUND).all())
+    return all((np.abs(own.moment(nearly, math.pi)) > BOUND).all() for own, _ in law.parts)
 
 
 def kept_apart(structure: Discretized, one: int, other: int) -> str:

@@ -26,6 +26,7 @@ from foldyn.structures.calibration import (
     fold_stiffness,
 )
 from foldyn.structures.edge_angles import edge_plates, spoke_stiffness
+from foldyn.structures.fold_law import FoldLaws
 from foldyn.structures.membranes import membranes
 from foldyn.structures.mesh import hinge_angles, n4b5, n5b8
 from foldyn.structures.plate import panel_plates, weld_stiffness
@@ -46,7 +47,7 @@ def discretize(
     scheme: Literal["n5b8", "n4b5", "n5b8e"] | None = None,
     mass: str | None = None,
     bar_law: str | BarLaw | None = None,
-    fold_law: str | HingeLaw | None = None,
+    fold_law: FoldLaws | None = None,
     bend_law: str | HingeLaw | None = None,
     calibration: Literal["standard", "merlin2", "plate"] | None = None,
     crease_stiffness: Folds = None,
@@ -77,8 +78,12 @@ def discretize(
         Mass rule, such as "consistent"; see the page on mass rules.
     bar_law : {"ogden", "linear"} or BarLaw
         Law of bars.
-    fold_law, bend_law : {"linear", "superlinear", "enhanced", "plate_superlinear"} or HingeLaw
-        Laws of creases, and of hinges inside panels.
+    fold_law : {"linear", "superlinear", "enhanced"} or HingeLaw, sequence or mapping, optional
+        Law of all creases, of each in the order of `pattern.creases`, or by name, as
+        `crease_stiffness`. Creases that are not named have the law of the name "others", which is
+        by default that of the preset.
+    bend_law : {"linear", "superlinear", "enhanced", "plate_superlinear"} or HingeLaw
+        Law of hinges inside panels.
     calibration : {"standard", "merlin2", "plate"}
         "merlin2" assigns bend stiffnesses and bar areas in MERLIN2's order (see
         `foldyn.structures.calibration`); "plate" makes panels bend and twist like thin plates, for

@@ -13,8 +13,7 @@ from scipy import sparse
 
 from foldyn.algebra.solvers import Fill
 from foldyn.errors import InputError
-from foldyn.materials import EnhancedLinear, HingeLaw, PlateSuperlinear, hinge_law
-from foldyn.materials.inelastic_law import memory_of
+from foldyn.materials import EnhancedLinear, HingeLaw, MemoryLaw, PlateSuperlinear
 from foldyn.materials.plate_superlinear import onset_parameters
 from foldyn.materials.series import in_series
 from foldyn.mechanics import Hinges
@@ -22,6 +21,7 @@ from foldyn.mechanics.assembly import Assembly
 from foldyn.patterns.pattern import refuse_junctions
 from foldyn.patterns.picture import picture
 from foldyn.patterns.topology import Edge
+from foldyn.structures.fold_law import law_of_folds
 from foldyn.structures.mass import Surface, center_of_mass, inertia_tensor, row_sums
 from foldyn.structures.mesh import double_areas, lengths
 from foldyn.structures.rigid_plates import Plate, rigid_plates
@@ -52,24 +52,35 @@ class HingeKind(NamedTuple):
         yield or creep: such a crease takes nearly the whole turn, as little moment remains for the
         panels.
         """
-        memory = memory_of(self.law)
-        elastic, flows = self.law, False
-        if memory is not None:
-            elastic, flows = memory.elastic, not memory.relaxes
-        if self.softness is None or flows or isinstance(elastic, EnhancedLinear):
+        if self.softness is None:
             return np.ones(len(self.stiffness))
-        return 1.0 - self.softness * self.stiffness
+        share = 1.0 - self.softness * self.stiffness
+        return self.law.each(
+            lambda law, rows: np.ones(len(share[rows])) if _takes_all(law) else share[rows]
+        )
 
     @property
-    def arrays(self) -> Hinges:
-        """The hinges for the compiled kernels."""
+    def by_law(self) -> tuple[HingeKind, ...]:
+        """The hinges of each law."""
+        parts = self.law.parts
+        return (self,) if len(parts) == 1 else tuple(
+            HingeKind(
+                self.name, law, self.nodes[rows], self.stiffness[rows], self.rest[rows],
+                softness=None if self.softness is None else self.softness[rows],
+            )
+            for law, rows in parts
+        )  # fmt: skip
+
+    def arrays(self, group: int) -> Hinges:
+        """The hinges, of one law, for the compiled kernels; group : see `Hinges`."""
         parameters = None if self.onset is None else onset_parameters(self.onset)
-        return Hinges(self.nodes, self.stiffness, self.rest, self.law, parameters, self.share)
+        own = self.nodes, self.stiffness, self.rest, self.law, parameters, self.share
+        return Hinges(*own, group)
 
     def law_of(self, row: int) -> HingeLaw:
         """Law of one hinge."""
         if self.onset is None:
-            return self.law
+            return self.law.at([row])
         return PlateSuperlinear(float(np.degrees(self.onset[row])))
 
     def energy(self, theta: NDArray, rest: NDArray) -> NDArray:
@@ -78,6 +89,12 @@ class HingeKind(NamedTuple):
             return in_series(self.law, theta, rest, self.share)[0]
         unit = PlateSuperlinear(float(np.degrees(1.0)))
         return self.onset**2 * unit.energy((theta - rest) / self.onset, 0.0)
+
+
+def _takes_all(law: HingeLaw) -> bool:
+    """Whether a crease takes the whole turn of its hinge; see `HingeKind.share`."""
+    flows = isinstance(law, MemoryLaw) and not law.relaxes
+    return flows or isinstance(law.elastic, EnhancedLinear)
 
 
 class Distributed(NamedTuple):
@@ -179,7 +196,7 @@ class Discretized:
     @cached_property
     def fold_law(self) -> HingeLaw:
         """Law of the folds."""
-        return hinge_law(self.options.fold_law, "fold_law")
+        return law_of_folds(self.options.fold_law, self.pattern)
 
     @cached_property
     def centers(self) -> NDArray:

@@ -23,7 +23,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping, Sequence
 from itertools import pairwise
 from types import MappingProxyType
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -256,6 +256,12 @@ def plates_model(
     clamps : (c, 3) nodes of the triangles at clamped edges.
     by_folds : whether the dofs beside a fold are those of explicit methods.
     """
+
+    def called_by(law: HingeLaw, rows: Any) -> NDArray[np.int64]:
+        numbers = np.array([law.code, *(law.addresses or (0, 0, 0))], np.int64)
+        return np.repeat(numbers[:, None], len(fold_rest[rows]), axis=1)
+
+    called = fold_law.each(called_by)
     return BarsPlates(
         bars=mechanics.build(nodes, bars, bar_stiffness, bar_law, ()),
         rotations=len(plates.rotation_hinge),
@@ -266,8 +272,8 @@ def plates_model(
         fold_stiffness=np.array(fold_stiffness, float),
         fold_rest=np.array(fold_rest, float),
         fold_parameters=fold_law.parameters(fold_rest).reshape(-1, 4),
-        code=int(fold_law.code),
-        addresses=np.array(fold_law.addresses or (0, 0, 0), np.int64),
+        code=called[0].copy(),
+        addresses=np.ascontiguousarray(called[1:].T),
         bend_rest=np.append(bend_rest, np.full(len(clamps), np.pi)),
         **plates._asdict(),
     )

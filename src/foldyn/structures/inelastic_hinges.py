@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.materials.inelastic_law import VARIABLES, Branch, MemoryLaw, memory_of
+from foldyn.materials.inelastic_law import VARIABLES, Branch, MemoryLaw
 from foldyn.materials.latching import Latching
 from foldyn.materials.law import PARAMETERS
 from foldyn.materials.prony import CODE as MAXWELL
@@ -25,14 +25,14 @@ class Remembering(NamedTuple):
     """Hinges of one kind whose law has memory.
 
     damping : damping (k,) of the creases, N m s/rad, if adjacent panels are compliant.
-    rows : (k,) rows of these hinges among all of the kind; None for all.
+    rows : (k,) rows of these hinges among all of the kind.
     """
 
     kind: str  # "fold" or "bend"
     law: MemoryLaw
     hinges: FoldHinges
     damping: NDArray
-    rows: NDArray | None = None
+    rows: NDArray
 
     @property
     def latches(self) -> bool:
@@ -83,17 +83,20 @@ def remembering(
     out, sheet = [], (structure.body if body is None else body).sheet
     damped = damping is not None and damping.any() and bool(sheet.offsets)
     for kind, given in laws.items():
-        law = memory_of(given)
-        if law is None and not (damped and kind == "fold"):
+        if given is None or (given.elastic is given and not (damped and kind == "fold")):
             continue
-        hinges = sheet.fold_hinges() if kind == "fold" else sheet.bend_hinges()
-        dampers = np.zeros(len(hinges.rest))
-        if damping is not None and kind == "fold":
-            dampers = np.where(hinges.remembers, damping[hinges.fold] * hinges.length, 0.0)
-        if law is not None:
-            out.append(Remembering(kind, law, hinges, dampers if law.relaxes else 0.0 * dampers))
-        if dampers.any() and (law is None or not law.relaxes):
-            out.append(Remembering(kind, CreaseDampers(), hinges, dampers))
+        whole = sheet.fold_hinges() if kind == "fold" else sheet.bend_hinges()
+        for law, rows in given.at(whole.fold).parts:
+            hinges, number = whole.some(rows), np.arange(len(whole.rest))[rows]
+            dampers = np.zeros(len(number))
+            if damping is not None and kind == "fold":
+                dampers = np.where(hinges.remembers, damping[hinges.fold] * hinges.length, 0.0)
+            relaxes = isinstance(law, MemoryLaw) and law.relaxes
+            if isinstance(law, MemoryLaw):
+                own = dampers if relaxes else 0.0 * dampers
+                out.append(Remembering(kind, law, hinges, own, number))
+            if dampers.any() and not relaxes:
+                out.append(Remembering(kind, CreaseDampers(), hinges, dampers, number))
     return tuple(out)
 
 

@@ -13,6 +13,7 @@ from typing import Any
 
 from foldyn.errors import InputError
 from foldyn.materials import EnhancedLinear, PlateSuperlinear, Superlinear, bar_law, hinge_law
+from foldyn.structures.fold_law import laws_given
 from foldyn.structures.mass import MASS_RULES
 from foldyn.structures.structure import MEMBRANES, ModelOptions
 from foldyn.values import choice, show
@@ -67,10 +68,10 @@ def resolved(preset: str | None = None, **given: Any) -> ModelOptions:
     if "membrane" in known:
         coupled = choice("membrane", known["membrane"], MEMBRANES) == "panel"
         known.setdefault("bar_law", "linear" if coupled else "ogden")
+    known["fold_law"], _ = laws_given(known.get("fold_law", base.fold_law), base.fold_law)
     options = ModelOptions(**{**vars(base), **known})
     choice("mass", options.mass, MASS_RULES)
     bar_law(options.bar_law)
-    hinge_law(options.fold_law, "fold_law")
     if options.membrane == "panel" and bar_law(options.bar_law) != bar_law("linear"):
         raise InputError(
             f" = {show(options.bar_law)}: bars that are coupled are linear in Green strain; leave "
@@ -84,8 +85,9 @@ def resolved(preset: str | None = None, **given: Any) -> ModelOptions:
 
 def implied(given: Mapping[str, Any]) -> str:
     """Name of the preset that the given options imply."""
-    folds = hinge_law(given.get("fold_law", "linear"), "fold_law")
-    plain = not OF_HINGES & {*given} and not isinstance(folds, Superlinear)
+    _, folds = laws_given(given.get("fold_law", "linear"))
+    soft = any(isinstance(law, Superlinear) for law in folds)
+    plain = not OF_HINGES & {*given} and not soft
     if plain or given.get("scheme") == N5B8E:
         return N5B8E
     if "calibration" in given:

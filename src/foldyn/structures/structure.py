@@ -25,6 +25,7 @@ from foldyn.structures.bars_hinges import GROUPS, BarsHingesTerm
 from foldyn.structures.bars_plates import BarsPlatesTerm, ClampsTerm, balanced
 from foldyn.structures.calibration import Folds, PerCrease, folds_given, per_crease
 from foldyn.structures.discretized import Discretized, HingeKind, read_only
+from foldyn.structures.fold_law import FoldLaws
 from foldyn.structures.held_edges import Guided, clamp_points, straight_in_bending
 from foldyn.structures.mass import MASS_RULES, Surface, lumped
 from foldyn.structures.membranes import PanelKind, swelling
@@ -50,7 +51,7 @@ class ModelOptions(Checked):
     scheme: Annotated[str, Check(choice, known=SCHEMES)] = "n5b8"
     mass: str = "consistent"
     bar_law: str | materials.BarLaw = "ogden"
-    fold_law: str | materials.HingeLaw = materials.EnhancedLinear()
+    fold_law: FoldLaws = materials.EnhancedLinear()
     bend_law: str | materials.HingeLaw = "linear"
     calibration: Annotated[str, Check(choice, known=CALIBRATIONS)] = "plate"
     crease_stiffness: Annotated[Folds, Check(folds_given, unit="N m/rad per m")] = None
@@ -181,7 +182,9 @@ class Structure(Discretized):
     @cached_property
     def model(self) -> mechanics.BarsHinges:
         """Arrays for the compiled kernels."""
-        hinges = tuple(kind.arrays for kind in self.hinge_kinds)
+        hinges = tuple(
+            own.arrays(group) for group, kind in enumerate(self.hinge_kinds) for own in kind.by_law
+        )
         return mechanics.build(self.nodes, self.bars, self.bar_stiffness, self.bar_law, hinges)
 
     @cached_property
