@@ -39,7 +39,7 @@ PAGE = "exports.md#mujoco"
 Pin = tuple[int, int, int]
 Joint = tuple[int | None, int, int]
 WORLD = 0  # number of the body that does not move
-LONGEST, PHASE = 2e-3, 0.1  # s, longest step; rad, phase of the fastest vibration in a step
+LONGEST, PHASE = 1e-3, 0.1  # s, longest step; rad, phase of the fastest vibration in a step
 STIFF = "0.9999 0.9999 1"  # impedance of constraints, the highest that MuJoCo takes
 FAR = 2.0 * np.pi  # rad, which creases do not turn
 ON_LINE = 1e-9  # width of points on a line, relative to its length
@@ -73,11 +73,11 @@ def _model(case: Case) -> Element:
 
     root = Element("mujoco", model=pattern.name or "foldyn")
     _add(root, "compiler", angle="radian")
-    tags = "default", "asset", "worldbody", "equality", "tendon", "actuator"
-    default, asset, world, equality, tendon, actuator = (_add(root, tag) for tag in tags)
+    tags = "default", "asset", "worldbody", "equality", "tendon"
+    default, asset, world, equality, tendon = (_add(root, tag) for tag in tags)
     apart, made = ends[:, 0] != ends[:, 1], {WORLD: world}
     free, stops = _stops(case, apart * length, tendon)
-    hinges = _hinges(case, apart * stiffness, length, free, actuator)
+    hinges = _hinges(case, apart * stiffness, length, free, root)
     step = _step(tensor, ends, along / length[:, None], stiffness + stops)
     gravity = sum((vector for vector, _ in case.gravity_terms), np.zeros(3))
     _add(root, "option", timestep=step, integrator="implicitfast", gravity=gravity)
@@ -246,28 +246,30 @@ def _stops(case: Case, length: NDArray, tendon: Element) -> tuple[NDArray, NDArr
 
 
 def _hinges(
-    case: Case, stiffness: NDArray, length: NDArray, free: NDArray, actuator: Element
+    case: Case, stiffness: NDArray, length: NDArray, free: NDArray, root: Element
 ) -> list[dict[str, Any]]:
-    """Attributes of the joints of creases, except their axes; add actuators.
+    """Attributes of the joints of creases, except their axes; add actuators to the root.
 
     A stiffness of 0 is no joint.
     """
-    structure, pattern = case.structure, case.structure.pattern
+    structure, pattern, actuator = case.structure, case.structure.pattern, _add(root, "actuator")
     damping = case.crease_damping * length + case.strain_damping * stiffness
-    turns = np.abs(sum((turns for turns, _ in case.actuation_terms), np.zeros(len(length))))
-    hinges = []
+    turns = sum((turns for turns, _ in case.actuation_terms), np.zeros(len(length)))
+    turns, hinges = np.where(stiffness > 0.0, turns, 0.0), []
     for k, turn in enumerate(turns.tolist()):
         name, start = f"crease_{k}", pattern.vertices[pattern.creases[k, 0]]
         ref = pattern.dihedrals[k] - structure.fold_rest[k]
         own = {"name": name, "pos": start, "ref": ref, "damping": damping[k]}
         if np.ptp(free[k]) < 2.0 * FAR:
             own |= {"range": free[k], "limited": "false"}
-        if turn * stiffness[k] > 0.0:
-            servo = {"kp": stiffness[k], "ctrlrange": (-turn, turn)}
+        if turn != 0.0:
+            servo = {"kp": stiffness[k], "ctrlrange": (-abs(turn), abs(turn))}
             _add(actuator, "position", name=name, joint=name, **servo)
         else:
             own["stiffness"] = stiffness[k]
         hinges.append(own)
+    if turns.any():
+        _add(_add(root, "keyframe"), "key", name="actuated", ctrl=turns[turns != 0.0])
     return hinges
 
 
