@@ -31,9 +31,9 @@ def add_convert(commands: Any) -> None:
         "convert",
         help="write a pattern file or a result in another format",
         description="Read a pattern file, or a result (.nc), and write it in the format that the "
-        "ending of OUT names; a case file becomes an input deck (.inp, .tcl). --check says what "
-        "was assumed of a pattern file, repaired and doubted, with the conditions of flat folding "
-        "at each vertex.",
+        "ending of OUT names; a case file becomes an input deck (.inp, .tcl) or a model of MuJoCo "
+        "(.xml). --check says what was assumed of a pattern file, repaired and doubted, with the "
+        "conditions of flat folding at each vertex.",
     )
     command.add_argument("file", metavar="IN", help="pattern file, result (.nc) or case file")
     command.add_argument("out", metavar="OUT", nargs="?", help="file to make or to replace")

@@ -13,7 +13,17 @@ import xarray as xr
 
 from foldyn.cases import Case
 from foldyn.errors import InputError
-from foldyn.exports import abaqus, csv_tables, glb, mat, opensees, pattern_states, uff, vtkhdf
+from foldyn.exports import (
+    abaqus,
+    csv_tables,
+    glb,
+    mat,
+    mjcf,
+    opensees,
+    pattern_states,
+    uff,
+    vtkhdf,
+)
 from foldyn.exports.chosen import ALONG
 from foldyn.input_files import path_of
 from foldyn.results import case_of, check_result, load
@@ -106,6 +116,7 @@ _EXPORTS = (
         "Abaqus: the shell, or effective properties as a section",
         of_cases=True,
     ),
+    Export("mjcf", (".xml",), OF_SHEETS, mjcf.write, "MuJoCo: rigid panels", of_cases=True),
 )
 
 EXPORTS: dict[str, Export] = {each.name: each for each in _EXPORTS}

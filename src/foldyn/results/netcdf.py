@@ -41,7 +41,7 @@ ENGINE = "h5netcdf"
 OTHERS = (
     ".cp", ".csv", ".dat", ".dxf", ".fold", ".gif", ".glb", ".html", ".inp", ".json", ".mat",
     ".mp4", ".npy", ".npz", ".obj", ".opx", ".parquet", ".pkl", ".png", ".stl", ".svg", ".tcl",
-    ".toml", ".tsv", ".txt", ".uff", ".unv", ".vtk", ".vtkhdf", ".vtu", ".xlsx", ".zarr",
+    ".toml", ".tsv", ".txt", ".uff", ".unv", ".vtk", ".vtkhdf", ".vtu", ".xlsx", ".xml", ".zarr",
 )  # fmt: skip
 """Suffixes that belong to other kinds of files."""
 _PARTS = ("real", "imag")
