@@ -32,8 +32,8 @@ import numpy as np
 import xarray
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.sparse.linalg import splu
 
+from foldyn.algebra.superlu import SingularTangentError, unsymmetric
 from foldyn.cases import State
 from foldyn.errors import InputError, warn
 from foldyn.linear.linearized import amplitude_of, slope_change
@@ -531,8 +531,8 @@ def _solved(matrix: sparse.csc_array, push: NDArray, rigid: NDArray) -> NDArray:
     whole = sparse.csc_array(sparse.block_array([[matrix, border], [border.conj().T, None]]))
     load = -np.concatenate([push, np.zeros((count, push.shape[1]))]).astype(whole.dtype)
     try:
-        found = splu(whole).solve(load)
-    except RuntimeError:  # a zero pivot
+        found = unsymmetric(whole).solve(load)
+    except SingularTangentError:
         found = np.full_like(load, np.nan)
     left = np.abs(whole @ found - load).max(axis=0)
     if not (left <= LEFT * np.abs(load).max(axis=0) + ROUNDING * scale).all():
