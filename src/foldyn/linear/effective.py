@@ -41,6 +41,7 @@ from foldyn.linear.linearized_cell import LinearizedCell, linearize_cell
 from foldyn.linear.unit_cell import UnitCell
 from foldyn.linear.wave_solver import WaveSolver
 from foldyn.results.dataset import result_dataset
+from foldyn.strength.resultants import for_stresses
 from foldyn.values import of_kind
 
 STRAINS = ("xx", "yy", "xy")
@@ -126,7 +127,7 @@ def effective(
     True
     """
     began = time.perf_counter()
-    case = of_kind("cell", cell, UnitCell).case
+    case = for_stresses(of_kind("cell", cell, UnitCell).case)
     structure = case.structure
     if case.supports or getattr(structure.options, "clamped", ()):
         raise InputError(": has supports or clamped edges, and a free material has none", "cell")
