@@ -151,6 +151,8 @@ FIELDS: Mapping[str, Callable[[Scene, dict], Any]] = {
     "bending": lambda s, _: s.positive(s.force * s.size**2),
     "Spring.change": lambda s, _: s.about(SMALL * s.size),
     "Cable.change": lambda s, _: s.about(SMALL * s.size),
+    "Cable.friction": lambda s, _: s.positive(0.3),
+    "Cable.sliding_speed": lambda s, _: s.positive(s.size / s.time),
     "stiffness_history": lambda s, _: drawn(s, HISTORIES.values()),
     "Dashpot.coefficient": lambda s, _: s.positive(s.mass / s.time),
     "CreaseDamping.coefficient": lambda s, _: s.positive(s.force * s.time),
