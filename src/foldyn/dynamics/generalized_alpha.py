@@ -153,9 +153,9 @@ class Alpha(Scheme):
         if system.turns:
             done += _actuation(self.context, self.folds, self.part.fold_angle)
         if len(self.driven):
-            ends = self.displacement(), self.moved(), h
-            done += _driving(self.context, self.driven, *ends)
-            lost += _driving(self.context, self.rubbing, *ends)  # it counts as damping above
+            done += _driving(self.context, self.driven, self.displacement(), self.moved(), h)
+            # what winches do against friction has been taken off what it dissipates
+            lost += _driving(self.context, self.rubbing, self.displacement(), self.moved(), h)
         return done, lost, to_air
 
     def change(self, h: float) -> NDArray:

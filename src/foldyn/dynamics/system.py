@@ -39,7 +39,6 @@ from foldyn.jit.intrinsics import flat
 from foldyn.mechanics.assembly import Assembly, Numbering
 from foldyn.mechanics.following import Following, joined
 from foldyn.mechanics.heat import Heat
-from foldyn.mechanics.term import Term
 
 NO_INERTIA = np.zeros(0)
 ROUNDING = 1e-14  # motions of other nodes below this share of support motion are zero
@@ -188,7 +187,7 @@ def pack(
     return PackedCase(body, system, mass, callbacks, by, modal, added, heat)
 
 
-def _driven(case: Case, histories: list[History], terms: Sequence[Term]) -> Assembly:
+def _driven(case: Case, histories: list[History], terms: Sequence[Any]) -> Assembly:
     """Body of a case with more terms, whose springs and obstacles follow the given histories."""
     rows = {plane: histories.index(history) for plane, history in case.obstacle_terms}
     body = case.body if not rows else case.elastic_body.with_terms(case.contact_term.driven(rows))

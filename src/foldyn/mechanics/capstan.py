@@ -24,26 +24,19 @@ from numpy.typing import NDArray
 
 from foldyn.jit.compiled import inner_scalar
 from foldyn.jit.context import Context, numbers_at, rows_at
-from foldyn.mechanics.lines import Lines, add_pull, along, drive_lines, growth_of
-from foldyn.mechanics.springs import SpringsTerm
-from foldyn.mechanics.term import (
-    FORCES,
-    PLACE_OBSTACLES,
-    CompiledTerm,
-    Term,
-    forces,
-    place_obstacles,
-)
+from foldyn.mechanics.lines import add_pull, along, growth_of
+from foldyn.mechanics.springs import Springs, SpringsTerm, drive_springs
+from foldyn.mechanics.term import FORCES, PLACE_OBSTACLES, CompiledTerm, Term, forces
 
 
 class Capstan(NamedTuple):
     """Arrays of c cables with p points in all, and results of the last evaluation."""
 
-    lines: Lines
+    springs: Springs  # the cables as lines
     rub: NDArray  # (c, 2) mu, and v0, m/s
     slide: NDArray  # (p,) memory: rate s at which the cable slides over each point, m/s
     slope: NDArray  # (p,) memory: derivative of mu a tanh(s / v0) by s, s/m
-    ratio: NDArray  # (p,) memory: T_j / T of the piece after each point
+    ratio: NDArray  # (p,) memory: T_j / T_0 of the piece after each point
     rows: int = 0
     histories: int = 0
 
@@ -60,9 +53,13 @@ def wrap(lines, u, i, before, after):
 
 @inner_scalar
 def spread(cables, s, u, v):
-    """Evaluate how a cable slides and spreads its tension; return l / l0, and T, N."""
-    lines, first, last = cables.lines, cables.lines.first[s], cables.lines.first[s + 1] - 1
-    natural, whole, growth, level, mean = lines.natural[s] + lines.now[s, 0], 0.0, 0.0, 0.0, 0.0
+    """Evaluate how a cable slides and spreads its tension; return l / l0, and T and T_0, N."""
+    lines, whole, growth, level, mean = cables.springs.lines, 0.0, 0.0, 0.0, 0.0
+    first, last, natural = (
+        lines.first[s],
+        lines.first[s + 1] - 1,
+        lines.natural[s] + lines.now[s, 0],
+    )
     for i in range(first, last):
         grown, length = growth_of(lines, u, v, i)
         whole, growth = whole + length, growth + grown
@@ -77,30 +74,23 @@ def spread(cables, s, u, v):
         cables.ratio[i] = math.exp(level)
         mean += cables.ratio[i] * length / whole
         share, grows, before = share + length / whole, grows + grown, length
-    for i in range(first, last):
-        cables.ratio[i] /= mean
-    return whole / natural, lines.stiffness[s] * lines.natural[s] * max(whole / natural - 1.0, 0.0)
+    tension = lines.stiffness[s] * lines.natural[s] * max(whole / natural - 1.0, 0.0)
+    return whole / natural, tension, tension / mean
 
 
 @forces
 def _forces(own, u, v, t, force, powers):
-    lines, ratio, total = own.lines, own.ratio, numbers_at(powers, 2)
+    lines, ratio, total = own.springs.lines, own.ratio, numbers_at(powers, 2)
     moved, speed, out = rows_at(u, own.rows), rows_at(v, own.rows), rows_at(force, own.rows)
     for s in range(own.rub.shape[0]):
         first, last = lines.first[s], lines.first[s + 1] - 1
-        stretch, tension = spread(own, s, moved, speed)
+        stretch, mean, start = spread(own, s, moved, speed)
         for i in range(first, last):
             length = growth_of(lines, moved, speed, i)[1]
-            pull = tension * (ratio[i] - 1.0) / length if length > 0.0 else 0.0
+            pull = (start * ratio[i] - mean) / length if length > 0.0 else 0.0
             add_pull(lines, i, pull, moved, moved, out)
-            step = ratio[i] - ratio[max(i - 1, first)]
-            total[1] += stretch * tension * step * own.slide[i]
-        total[0] -= stretch * tension * (ratio[last - 1] - 1.0) * lines.now[s, 1]
-
-
-@place_obstacles
-def _drive(own, factors):
-    drive_lines(own.lines, rows_at(factors, own.histories))
+            total[1] += stretch * start * (ratio[i] - ratio[max(i - 1, first)]) * own.slide[i]
+        total[0] -= stretch * (start * ratio[last - 1] - mean) * lines.now[s, 1]
 
 
 class CapstanTerm(Term):
@@ -119,16 +109,15 @@ class CapstanTerm(Term):
     undifferentiated: ClassVar[str] = "friction of cables"
 
     def __init__(self, springs: SpringsTerm, rub: NDArray) -> None:
-        self.springs, lines, self.histories = springs, springs.springs.lines, springs.histories
-        slide, slope, ratio = np.zeros((3, len(lines.node)))
-        self.cables = Capstan(lines, rub, slide, slope, ratio)
+        self.springs, self.histories = springs, springs.histories
+        slide, slope, ratio = np.zeros((3, len(springs.springs.lines.node)))
+        self.cables = Capstan(springs.springs, rub, slide, slope, ratio)
 
     def compiled(self, part: Any, kept: Any, group: int) -> CompiledTerm:
         """See `Term`."""
-        sizes = int(part.own[1]), len(self.histories)
-        own = Context(self.cables._replace(rows=sizes[0], histories=sizes[1]))
-        drive = {PLACE_OBSTACLES: _drive} if self.histories else {}
-        return CompiledTerm(own, {FORCES: _forces} | drive)
+        own = self.cables._replace(rows=int(part.own[1]), histories=len(self.histories))
+        drive = {PLACE_OBSTACLES: drive_springs} if self.histories else {}
+        return CompiledTerm(Context(own), {FORCES: _forces} | drive)
 
     @property
     def places(self) -> tuple[NDArray, NDArray]:
@@ -147,24 +136,21 @@ class CapstanTerm(Term):
 
     def _derivatives(self, q: NDArray) -> NDArray:
         """Entries (2, k) of the derivatives by velocity and by displacement."""
-        lines, found = self.cables.lines, [np.zeros((2, 0))]
-        for s, dofs in enumerate(self.springs.dofs):
-            own, moved = (
-                slice(lines.first[s], lines.first[s + 1] - 1),
-                np.append(q, [0.0] * 3)[dofs],
-            )
+        lines, u, found = self.cables.springs.lines, np.append(q, np.zeros(3)), [np.zeros((2, 0))]
+        for s, dofs in enumerate(self.springs.dofs):  # those of the ground come last
+            own = slice(lines.first[s], lines.first[s + 1] - 1)
             ratio, slope = self.cables.ratio[own], self.cables.slope[own]
-            vector = lines.vector[own] + np.diff(moved.reshape(-1, 3), axis=0)  # the ground is last
+            vector = lines.vector[own] + np.diff(u[dofs].reshape(-1, 3), axis=0)
             length, natural = np.linalg.norm(vector, axis=1), lines.natural[s] + lines.now[s, 0]
-            whole, ends = length.sum(), np.diff(np.eye(len(ratio) + 1), axis=0)
-            unit = vector / np.where(length > 0.0, length, 1.0)[:, None]
+            unit, whole = vector / np.where(length > 0.0, length, 1.0)[:, None], length.sum()
             if not ratio.any():  # not evaluated yet: all sticks
                 turns = np.arccos(np.clip((unit[1:] * unit[:-1]).sum(axis=1), -1.0, 1.0))
-                mu, speed = self.cables.rub[s]
-                ratio, slope = np.ones(len(ratio)), np.append(0.0, turns * mu / speed)
+                slope = np.append(0.0, turns * self.cables.rub[s, 0] / self.cables.rub[s, 1])
+                ratio = np.ones(len(slope))
+            ratio = ratio * whole / (ratio @ length)  # to the mean
+            after, ends = np.tri(len(ratio)), np.diff(np.eye(len(ratio) + 1), axis=0)
             rates = np.einsum("ja,jx->jax", ends, unit).reshape(len(ratio), -1)  # of the lengths
-            after, k = np.tri(len(ratio)), lines.stiffness[s] * lines.natural[s] / natural
-            k *= whole > natural
+            k = lines.stiffness[s] * lines.natural[s] / natural * (whole > natural)
             slides = after.T @ rates - np.outer(after.T @ length / whole, rates.sum(axis=0))
             turn = slope * ratio[:, None] * (after - (ratio * length) @ after / whole)
             damping = k * (whole - natural) * natural / whole * (rates.T @ turn @ slides)

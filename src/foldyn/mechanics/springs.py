@@ -162,7 +162,8 @@ def _limit(own, u, v, a, h, beta, energy, lightness):
 
 
 @place_obstacles
-def _drive(own, factors):
+def drive_springs(own, factors):
+    """Set the springs and lines of a context to factors of its histories."""
     springs, found = own.springs, rows_at(factors, own.histories)
     for s in range(springs.row.size):
         if springs.row[s] >= 0:
@@ -215,7 +216,9 @@ class SpringsTerm(Term):
         own = Context(_Context(self.springs, group, int(part.own[1]), len(self.histories)))
         kernels = {FORCES: _forces, ENERGIES: _energies, MEAN_FORCES: _mean_forces}
         kernels |= {LIMIT: _limit} if self.springs.lines.slack.any() else {}
-        return CompiledTerm(own, kernels | ({PLACE_OBSTACLES: _drive} if self.histories else {}))
+        return CompiledTerm(
+            own, kernels | ({PLACE_OBSTACLES: drive_springs} if self.histories else {})
+        )
 
     def arrays(self) -> Arrays:
         """See `Term`."""
@@ -268,9 +271,7 @@ class SpringsTerm(Term):
         along = np.einsum("s,sa,sb->sab", stiffness, direction, direction)
         lines = np.zeros(self._line_places.shape[1])
         line_blocks(springs.lines, nodal(q), loose, lines)
-        return np.concatenate(
-            [blocks_of_ends(self.springs.ends, along).ravel(), lines[self.moves]]
-        )
+        return np.concatenate([blocks_of_ends(self.springs.ends, along).ravel(), lines[self.moves]])
 
     def unstrained(self, q: NDArray) -> Unstrained:
         """See `Term`."""

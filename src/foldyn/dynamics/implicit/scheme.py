@@ -303,8 +303,8 @@ class Scheme(ABC):
         """Arguments for `back`: the state in which `tangent` makes the matrix after `residual`."""
         own, memory = self, self.packed.body.find(HingeMemory)
         kept = () if memory is None else memory.snapshot()
-        start, end = own.old, own.new
-        arrays = (start.q, start.w, start.a, start.factor, own.shift, end.factor, own.state.angle)
+        start = (*own.old[:3], own.old.factor)
+        arrays = (*start, own.shift, own.new.factor, own.state.angle)
         return tuple(array.copy() for array in (*arrays, *kept))
 
     def back(self, h: float, origin: Sequence[NDArray]) -> None:
