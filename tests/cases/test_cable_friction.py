@@ -7,7 +7,7 @@ import math
 import numpy as np
 import pytest
 from attached_cases import FOLD, moved, structure
-from test_cables import blocks, level, on_rails
+from test_cables import SHEET, blocks, level, on_rails
 
 import foldyn as fd
 from foldyn.dynamics import METHODS
@@ -274,8 +274,32 @@ def test_what_has_no_sliding_refuses_friction(analysis):
 
 
 def test_gradients_and_graphics_cards_refuse_friction():
-    case = fd.Case(blocks((0, 0, 0)), [fd.Cable([0, 1, 2], EA, friction=0.2)])
+    s = structure("bars and hinges", FOLD, SHEET, mass="mixed_voronoi")
+    case = fd.Case(s, [fd.Cable([0, 1, 2], EA, friction=0.2)])
     packed = pack(case, 1.0)
     assert lacking(case, packed) == "the term Capstan"
     with pytest.raises(InputError, match="no gradients through friction of cables"):
         arrays_of_body(packed.body)
+
+
+PULLED = """
+pattern = { kind = "miura", cells = [1, 1], a = 0.04, b = 0.04, panel_angle = 60, dihedral = 110 }
+sheet = { youngs_modulus = 2e9, poissons_ratio = 0.3, thickness = 3e-4, density = 1200.0 }
+model = { preset = "plate" }
+supports = [
+  { nodes = "xmin" },
+  { cable = [7, 4, [0.1, 0.03, 0.05]], cable_stiffness = 0.5, pretension = 1e-3, RUBS },
+]
+analysis = { kind = "dynamics", duration = 1e-3 }
+"""
+
+
+def test_a_case_file_gives_friction_and_results_keep_it(tmp_path):
+    file = tmp_path / "case.toml"
+    file.write_text(PULLED.replace("RUBS", "cable_friction = 0.2, cable_sliding_speed = 1e-2"))
+    motion = fd.read_case(file).run()
+    assert float(motion.dissipated[-1]) > 0.0
+    fd.save(motion, tmp_path / "pulled.nc")
+    supports = fd.case_of(fd.load(tmp_path / "pulled.nc")).supports
+    (cable,) = (part for part in supports if isinstance(part, fd.Cable))
+    assert (cable.friction, cable.sliding_speed) == (0.2, 1e-2)

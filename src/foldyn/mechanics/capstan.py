@@ -152,6 +152,7 @@ class CapstanTerm(Term):
             rates = np.einsum("ja,jx->jax", ends, unit).reshape(len(ratio), -1)  # of the lengths
             k = lines.stiffness[s] * lines.natural[s] / natural * (whole > natural)
             slides = after.T @ rates - np.outer(after.T @ length / whole, rates.sum(axis=0))
+            # what slides faster pulls harder after the point, and less before it for the same mean
             turn = slope * ratio[:, None] * (after - (ratio * length) @ after / whole)
             damping = k * (whole - natural) * natural / whole * (rates.T @ turn @ slides)
             stiffness = k * np.outer((ratio - 1.0) @ rates, rates.sum(axis=0))
