@@ -315,7 +315,7 @@ def solar_array(found):
     assert float(turn.max()) > 45.0
     assert float(motion.work[-1]) < -3.0  # the motor brakes
     x = motion.displacement + motion.rest_position
-    assert np.ptp(x[-1, :40, 0].values) > 3.45  # of 3.5 m
+    assert np.ptp(x[-1, :40, 0].values) > 3.42  # of 3.5 m, turned by 8 degrees
 
 
 def thick_panel(found):

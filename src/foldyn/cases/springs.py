@@ -214,6 +214,8 @@ class Bar(Elastic):
     bending : float, optional
         EI (N m2) about the weakest axis. With it, paths and motions warn where a bar is pressed
         with more than its buckling load, pi^2 EI / L^2 (Euler).
+    mass : float
+        Mass (kg) of each bar, spread evenly along it: m/6 [2 1; 1 2] at its ends.
     """
 
     between: Annotated[Pairs, Key("bar")]
@@ -224,6 +226,7 @@ class Bar(Elastic):
     bending: Annotated[float | None, Check(number, above=0.0, unit="N m2"), Key("bar_bending")] = (
         None
     )
+    mass: Annotated[float, Check(number, least=0.0, unit="kg"), Key("bar_mass")] = 0.0
 
     missing = {"bar_stiffness": "give EA (N) of the bars"}
     apart = "bars are a support of their own"
