@@ -385,6 +385,28 @@ def test_gradients_by_the_mass_of_a_bar():
         )
 
 
+@pytest.mark.matrix
+def test_a_tube_is_zipped_shut():
+    """Springs that come on as two edges meet hold them after what folded the tube lets go."""
+    points = [(0.05 * k, y, 0.0) for k in range(4) for y in (0.0, 0.2)]
+    strip = fd.Pattern(points, [(2 * k, 2 * k + 2, 2 * k + 3, 2 * k + 1) for k in range(3)], "VV")
+    film = fd.Sheet(2e9, 0.3, thickness=5e-4, density=1200.0)
+    strip = fd.discretize(strip, film, preset="plate", crease_stiffness=0.02, fold_law="linear")
+    folding = fd.Table([0.0, 1.0, 1.5, 2.5], [0.0, 1.0, 1.0, 0.0], smooth=True)
+    closing = fd.Table([0.0, 1.0, 1.2, 2.5], [1e-6, 1e-6, 1.0, 1.0])
+    pairs, width = [(0, 6), (1, 7)], 2e-2
+    for stiffness, last in ((100.0, 2.1e-2), (1e-3, 0.15)):
+        seam = fd.Spring(stiffness, between=pairs, rest_length=width, stiffness_history=closing)
+        held = [fd.Fix([2, 3]), fd.Fix([4], "z"), seam]
+        turn = [fd.Actuate("all", 75.0, history=folding)]
+        case = fd.Case(strip, held, turn, fd.CreaseDamping(5e-3))
+        motion = fd.simulate(case, 2.5, interval=0.05)
+        assert motion.attrs["energy_error"] < 3e-3
+        x = motion.displacement.values[-1] + strip.nodes
+        gap = np.linalg.norm(x[6] - x[0])
+        assert abs(gap - last) < 0.1 * last + 1e-3
+
+
 WRONG = {
     "one point": (lambda: fd.Cable([3], 1.0), "runs over at least two points"),
     "twice the same": (
