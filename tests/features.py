@@ -80,7 +80,7 @@ FEATURES: Mapping[str, Make] = {
     "springs of changing stiffness": lambda s: s.case(
         supports=[fd.Spring(1.0, nodes=[7], stiffness_history=fd.Ramp(1.0))]
     ),
-    "bars": lambda s: s.case(supports=[fd.Bar([(5, 7)], 1.0)]),
+    "bars": lambda s: s.case(supports=[fd.Bar([(5, 7)], 1.0, mass=1e-3)]),
     "cables": lambda s: s.case(
         supports=[fd.Cable([5, 7, (3, 1, 1)], 1.0, change=-0.01, history=fd.Ramp(DURATION))]
     ),
@@ -117,6 +117,9 @@ FEATURES: Mapping[str, Make] = {
     "contact of thick panels": lambda s: s.case(
         s.sheet(fd.thicken(fd.patterns.simple_fold(dihedral=90), SHEET.thickness)),
         contact=fd.Contact(),
+    ),
+    "a law for each family of creases": partial(
+        Setting.law, law={"mountain": "linear", "valley": fd.EnhancedLinear(theta1=60.0)}
     ),
     **{
         f"creases{of} that {name}": partial(Setting.law, law=law, **options)
