@@ -134,16 +134,13 @@ def _mesh(
         for panel, (a, b) in zip(inner_panel, inner, strict=True)
     ]
 
-    def hinge(edge: list[int], panels: list[int], ways: list[int]) -> tuple[int, ...]:
-        there, back = edge[:: ways[0]], edge[:: -ways[1]]
-        return *edge, third[panels[0], there[0], there[1]], third[panels[1], back[0], back[1]]
+    def hinges(*creases: NDArray) -> NDArray:
+        rows = []
+        for edge, panels, ways in zip(*(each.tolist() for each in creases), strict=True):
+            there, back = edge[:: ways[0]], edge[:: -ways[1]]
+            rows.append((*edge, third[panels[0], *there], third[panels[1], *back]))
+        return _rows(rows, 4)
 
-    folds = map(
-        hinge, pattern.creases.tolist(), pattern.crease_faces.tolist(), pattern.crease_ways.tolist()
-    )
-    welds = map(
-        hinge, pattern.welds.tolist(), pattern.weld_faces.tolist(), pattern.weld_ways.tolist()
-    )
     mesh = Mesh(
         nodes=nodes,
         centers=centers,
@@ -152,8 +149,8 @@ def _mesh(
         bends=_rows(bends, 4),
         triangles=_rows(triangles, 3),
         triangle_panel=np.array(triangle_panel, np.int64),
-        folds=_rows(list(folds), 4),
-        welds=_rows(list(welds), 4),
+        folds=hinges(pattern.creases, pattern.crease_faces, pattern.crease_ways),
+        welds=hinges(pattern.welds, pattern.weld_faces, pattern.weld_ways),
     )
     check_triangles(nodes, mesh.triangles, mesh.triangle_panel, pattern, remedy)
     return mesh

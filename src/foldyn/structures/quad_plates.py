@@ -320,9 +320,7 @@ def _jacobian(x: NDArray, at: NDArray) -> NDArray:
     one = 1.0 + SIGNS[None] * at[:, None]
     by_xi = 0.25 * SIGNS[:, 0] * one[:, :, 1]
     by_eta = 0.25 * SIGNS[:, 1] * one[:, :, 0]
-    return np.stack([np.swapaxes(by @ x, 1, 2) for by in (by_xi, by_eta)], axis=0).transpose(
-        1, 3, 2, 0
-    )
+    return np.stack([by_xi @ x, by_eta @ x], axis=-1)
 
 
 def _gradients(x: NDArray, edge: int | None) -> tuple[NDArray, NDArray, NDArray]:
