@@ -183,9 +183,8 @@ class ModesGradient(Differentiated):
         """Refuse derivatives of one of several modes with equal frequency."""
         for first, last in self._clusters():
             values = by_value[first:last]
-            sum_alone = not by_shape[:, first:last].any() and np.ptp(values) <= SAME * np.abs(
-                values
-            ).max(initial=0.0)
+            sum_alone = np.ptp(values) <= SAME * np.abs(values).max()
+            sum_alone &= not by_shape[:, first:last].any()
             if not sum_alone and not self._parted:
                 raise InputError(
                     f"modes {first + 1} to {last} have the same frequency and may swap: single "
