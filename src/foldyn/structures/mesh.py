@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -296,11 +297,9 @@ def polygon_center(x: NDArray) -> NDArray:
         return (np.abs(points @ normal.T - offset) / length).sum(axis=1)
 
     crossings = [np.zeros(2)]
-    for a in range(len(pairs)):
-        for b in range(a + 1, len(pairs)):
-            system = normal[[a, b]]
-            if abs(np.linalg.det(system)) > 1e-9:
-                crossings.append(np.linalg.solve(system, offset[[a, b]]))
+    for two in map(list, combinations(range(len(pairs)), 2)):
+        if abs(np.linalg.det(normal[two])) > 1e-9:
+            crossings.append(np.linalg.solve(normal[two], offset[two]))
     candidates = np.array(crossings)
     value = total(candidates)
     tied = value <= value.min() + 1e-9
