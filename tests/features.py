@@ -84,6 +84,11 @@ FEATURES: Mapping[str, Make] = {
     "cables": lambda s: s.case(
         supports=[fd.Cable([5, 7, (3, 1, 1)], 1.0, change=-0.01, history=fd.Ramp(DURATION))]
     ),
+    "cables with friction": lambda s: s.case(
+        supports=[
+            fd.Cable([5, 7, (3, 1, 1)], 1.0, change=-0.01, history=fd.Ramp(DURATION), friction=0.2)
+        ]
+    ),
     "end stops": lambda s: s.case(supports=[fd.Stop([0], 150.0, stiffness=1e-3, side="below")]),
     "damped end stops": lambda s: s.case(
         supports=[fd.Stop([0], 299.9, stiffness=1e-3, damping=1e-6)]
@@ -127,6 +132,10 @@ REASONS: Mapping[str, tuple[str, str]] = {
         "contacts stick or slide, so that no linear law describes small motions",
     ),
     "c": ("stiffness_history", "only motions have a time in which a stiffness can vary"),
+    "d": (
+        "needs a motion",
+        "cables rub against the motion, and where they stick, no linear law describes small ones",
+    ),
     "b": (
         "creep",
         "load factors that the method finds may turn back, so that no step has a time in which "

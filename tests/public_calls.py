@@ -98,6 +98,7 @@ DATA: Calls = {
     }),
     "Cable": (fd.Cable, {
         "nodes": [0, 1, (0.5, 0.25, 1.0)], "stiffness": 2.0, "pretension": 0.5, "change": 0.25,
+        "friction": 0.5, "sliding_speed": 0.25,
     }),
     "Dashpot": (fd.Dashpot, {"coefficient": 2.0, "nodes": 0, "direction": (1.0, 0.0, 0.0)}),
     "Stop": (fd.Stop, {"creases": [0], "angle": 30.0, "stiffness": 2.0, "side": "below",

@@ -244,10 +244,10 @@ NAMED = 6
 """Largest number of places that are listed."""
 
 
-def listed(names: Sequence[object]) -> str:
-    """Names on one line, truncated."""
-    more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
-    return f"{', '.join(map(str, names[:NAMED]))}{more}"
+def listed(names: Sequence[object], most: int = NAMED) -> str:
+    """Names on one line, truncated, as in "1, 2, 5 and 4 more"."""
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return f"{', '.join(map(str, names[:most]))}{more}"
 
 
 class Told:

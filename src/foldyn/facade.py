@@ -1,13 +1,14 @@
-"""Packages that load public names on first use, so that importing them is fast.
+"""Packages whose public names are listed once, in their stubs.
 
 The stub of such a package, `__init__.pyi`, lists its public names and their modules, for type
-checkers and for this module.
+checkers and for this module. Most packages load names on first use, so that importing them is fast.
 """
 
 from __future__ import annotations
 
 import ast
 import gc
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from importlib import import_module
@@ -27,9 +28,7 @@ def lazy(
     *own : str
         Public names that the package defines itself.
     """
-    stub = ast.parse(Path(file).with_suffix(".pyi").read_text("utf-8"))
-    imports = [statement for statement in stub.body if isinstance(statement, ast.ImportFrom)]
-    homes = {alias.name: each.module or package for each in imports for alias in each.names}
+    homes = _homes(package, file)
     public = sorted((*homes, *own))
 
     def load(name: str) -> Any:
@@ -41,6 +40,25 @@ def lazy(
             return getattr(import_module(homes[name]), name)
 
     return load, lambda: public, public
+
+
+def eager(package: str, file: str) -> tuple[Callable[[], list[str]], list[str]]:
+    """Load the names of a package with modules of the same names; return `__dir__` and `__all__`.
+
+    Importing such a module puts it in the place of the name, which must be set after that.
+    """
+    homes = _homes(package, file)
+    for name, home in homes.items():
+        setattr(sys.modules[package], name, getattr(import_module(home), name))
+    public = sorted(homes)
+    return lambda: public, public
+
+
+def _homes(package: str, file: str) -> dict[str, str]:
+    """Modules of public names."""
+    stub = ast.parse(Path(file).with_suffix(".pyi").read_text("utf-8"))
+    imports = [statement for statement in stub.body if isinstance(statement, ast.ImportFrom)]
+    return {alias.name: each.module or package for each in imports for alias in each.names}
 
 
 @contextmanager

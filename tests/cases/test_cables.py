@@ -334,6 +334,79 @@ def test_bars_that_would_buckle_are_told():
         assert float(path.tension[-1, 0]) == pytest.approx(-load, rel=1e-6)
 
 
+# ------------------------------------------------------------------ the mass of bars
+@pytest.mark.parametrize("model", [fd.discretize, fd.shell, fd.superelements])
+def test_a_bar_has_the_inertia_of_a_rod(model):
+    """About its end m L^2 / 3; in translation m; its weight is shared by its ends."""
+    x = np.concatenate([TRIANGLE, np.add(TRIANGLE, (0.0, 0.0, 2.0))])
+    s = model(fd.Pattern(x, [[0, 1, 2], [3, 4, 5]]), SHEET)
+    case = fd.Case(s, [fd.Bar([(0, 3), (1, 4)], EA, mass=6.0)], [fd.Gravity((0, 0, -G))])
+    turning = s.nodes[:, 2]  # velocity along x of a turn about the plane z = 0
+    for motion, expected in ((np.ones(len(turning)), 12.0), (turning, 2 * 6.0 * 2.0**2 / 3.0)):
+        assert motion @ (case.carried @ motion) == pytest.approx(expected, rel=1e-12)
+    np.testing.assert_allclose(case.point_masses[[0, 1, 2, 3, 4, 5]], [3, 3, 0, 3, 3, 0])
+    assert case.total_mass == pytest.approx(12.0 + s.total_mass, rel=1e-12)
+
+
+@pytest.mark.parametrize("method", ["rk4", "newmark", "energy_momentum"])
+def test_a_bar_swings_like_a_physical_pendulum(method):
+    """A rod that carries a block of mass M at its end: w^2 = (m/2 + M) g / ((m/3 + M) L)."""
+    s, m, L, swing = blocks((0, 0, 0), (0, 0, -1)), 3.0, 1.0, 1e-3
+    M = s.total_mass / 2.0
+    own = L / (1.0 + (m / 2 + M) * G / 1e6)  # as long as L under the weight
+    bar = fd.Bar([(0, 3)], 1e6, rest_length=own, mass=m)
+    held = [fd.Fix([0, 1, 2]), fd.Link([3, 4, 5]), bar]
+    case = fd.Case(s, [*held, fd.Fix(list(range(6)), "y")], [fd.Gravity((0, 0, -G))])
+    period = 2.0 * math.pi * math.sqrt((m / 3 + M) * L / ((m / 2 + M) * G))
+    aside = np.zeros_like(s.nodes)
+    aside[3:, 0] = swing
+    dt = period / (4000 if method == "rk4" else 200)
+    motion = fd.simulate(
+        case, period, method=method, dt=dt, initial=fd.State(aside), interval=period / 4
+    )
+    expected = swing * np.cos(0.5 * np.pi * np.arange(5))
+    np.testing.assert_allclose(motion.displacement[:5, 3, 0], expected, atol=1e-3 * swing)
+
+
+def test_gradients_by_the_mass_of_a_bar():
+    for model in (fd.discretize, fd.superelements):
+
+        def frequency(mass, model=model):
+            s = model(fd.patterns.simple_fold(a=0.3, b=0.3), SHEET)
+            return fd.Case(
+                s, [fd.Fix("xmin", "xyz"), fd.Fix("xmax", "z"), fd.Bar([(1, 5)], 1e3, mass=mass)]
+            )
+
+        found = fd.sensitivity(frequency, {"mass": 0.4}, measures="frequency[1]",
+                               analysis={"kind": "modes", "count": 1})  # fmt: skip
+        ends = [fd.modes(frequency(mass), 1).frequency.values[0] for mass in (0.399, 0.401)]
+        assert float(found["gradient_mass"][0]) == pytest.approx(
+            (ends[1] - ends[0]) / 2e-3, rel=1e-4
+        )
+
+
+@pytest.mark.matrix
+def test_a_tube_is_zipped_shut():
+    """Springs that come on as two edges meet hold them after what folded the tube lets go."""
+    points = [(0.05 * k, y, 0.0) for k in range(4) for y in (0.0, 0.2)]
+    strip = fd.Pattern(points, [(2 * k, 2 * k + 2, 2 * k + 3, 2 * k + 1) for k in range(3)], "VV")
+    film = fd.Sheet(2e9, 0.3, thickness=5e-4, density=1200.0)
+    strip = fd.discretize(strip, film, preset="plate", crease_stiffness=0.02, fold_law="linear")
+    folding = fd.Table([0.0, 1.0, 1.5, 2.5], [0.0, 1.0, 1.0, 0.0], smooth=True)
+    closing = fd.Table([0.0, 1.0, 1.2, 2.5], [1e-6, 1e-6, 1.0, 1.0])
+    pairs, width = [(0, 6), (1, 7)], 2e-2
+    for stiffness, last in ((100.0, 2.1e-2), (1e-3, 0.15)):
+        seam = fd.Spring(stiffness, between=pairs, rest_length=width, stiffness_history=closing)
+        held = [fd.Fix([2, 3]), fd.Fix([4], "z"), seam]
+        turn = [fd.Actuate("all", 75.0, history=folding)]
+        case = fd.Case(strip, held, turn, fd.CreaseDamping(5e-3))
+        motion = fd.simulate(case, 2.5, interval=0.05)
+        assert motion.attrs["energy_error"] < 3e-3
+        x = motion.displacement.values[-1] + strip.nodes
+        gap = np.linalg.norm(x[6] - x[0])
+        assert abs(gap - last) < 0.1 * last + 1e-3
+
+
 WRONG = {
     "one point": (lambda: fd.Cable([3], 1.0), "runs over at least two points"),
     "twice the same": (

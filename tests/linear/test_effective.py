@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +11,7 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 import foldyn as fd
+from foldyn.algebra import superlu
 from foldyn.errors import FoldynWarning, InputError
 from foldyn.linear.effective import _solved, compliance, effective
 from foldyn.linear.linearized_cell import linearize_cell
@@ -188,20 +188,21 @@ def test_the_choice_of_the_cell_does_not_matter(model):
     np.testing.assert_array_equal(own, own.T)
     assert np.linalg.eigvalsh(own).min() > 0.0
     scale = np.sqrt(np.outer(np.diag(own), np.diag(own)))
+    near = 1e-8 if model == "superelements" else 1e-9
     for other in (*others, (points, faces, [vectors[0], vectors[0] + vectors[1]])):
         again = stiffness(properties(*other, model))
-        np.testing.assert_allclose(again / scale, own / scale, rtol=0.0, atol=1e-9)
+        np.testing.assert_allclose(again / scale, own / scale, rtol=0.0, atol=near)
     # turned in the plane, turned out of it, and seen from behind
     c, s = np.cos(0.7), np.sin(0.7)
     spin = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
     again = stiffness(properties(points @ spin.T, faces, vectors @ spin.T, model))
     change = np.kron(np.eye(2), turned(spin[:2, :2]))
-    np.testing.assert_allclose(change.T @ again @ change / scale, own / scale, atol=1e-9)
+    np.testing.assert_allclose(change.T @ again @ change / scale, own / scale, atol=near)
     mirror = np.diag([1.0, 1.0, -1.0])
     back = [face[::-1] for face in faces]
     again = stiffness(properties(points @ mirror, back, vectors, model))
     flip = np.diag([1, 1, 1, -1, -1, -1])
-    np.testing.assert_allclose(flip @ again @ flip / scale, own / scale, atol=1e-9)
+    np.testing.assert_allclose(flip @ again @ flip / scale, own / scale, atol=near)
     tilted = np.array([[0, 0, 1], [1, 0, 0], [0, 1, 0]]).T
     found = properties(points @ tilted.T, faces, vectors @ tilted.T, model)
     way = found.frame.values[:2] @ tilted[:, :2]
@@ -209,7 +210,7 @@ def test_the_choice_of_the_cell_does_not_matter(model):
         np.diag([1.0, np.linalg.det(way)]), np.eye(3)
     )
     again = stiffness(found)
-    np.testing.assert_allclose(change.T @ again @ change / scale, own / scale, atol=1e-9)
+    np.testing.assert_allclose(change.T @ again @ change / scale, own / scale, atol=near)
 
 
 @pytest.mark.parametrize("preset", ["n5b8e", "plate", "herkal"])
@@ -227,6 +228,8 @@ def test_long_waves_have_the_predicted_speeds(model):
     points, faces, vectors = uneven((3, 1))
     thick = replace(SHEET, thickness=5e-3)
     structure = MODELS[model](fd.Pattern(points, faces), thick, crease_stiffness=30.0)
+    if model == "superelements":
+        structure = structure.for_stresses  # the shapes that `effective` takes
     cell = fd.UnitCell(fd.Case(structure), vectors=vectors)
     found = effective(cell)
     x, y = np.cos(0.4), np.sin(0.4)
@@ -239,7 +242,7 @@ def test_long_waves_have_the_predicted_speeds(model):
         phases = [n * vectors @ [x, y, 0.0] for n in (number, 2.0 * number)]
         waves = fd.bands(cell, phases, count=3, track=False, check_model=False)
         own = waves.eigenvalue.values[:, kept] / np.array([[1.0], [2.0**power]]) / number**power
-        assert (4.0 * own[0] - own[1]) / 3.0 == pytest.approx(expected[kept], rel=1e-5)
+        assert (4.0 * own[0] - own[1]) / 3.0 == pytest.approx(expected[kept], rel=2e-5)
 
 
 # ---------------------------------------------------------------------- states
@@ -330,8 +333,7 @@ def test_a_state_takes_few_factorizations(monkeypatch):
         factorized.append(matrix.shape)
         return splu(matrix, *args, **options)
 
-    for name in ("effective", "wave_solver"):
-        monkeypatch.setattr(importlib.import_module(f"foldyn.linear.{name}"), "splu", counted)
+    monkeypatch.setattr(superlu, "splu", counted)
     effective(fd.UnitCell(fd.Case(fd.discretize(fd.patterns.miura(cells=(2, 3)), SHEET))))
     assert 1 <= len(factorized) <= 5
 

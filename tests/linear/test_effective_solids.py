@@ -46,6 +46,8 @@ def of_layers(model, k=0):
 def test_long_waves_have_the_speeds_of_sound(model):
     """Of a wave along n the stiffness n . C . n (Christoffel) has the eigenvalues rho c^2."""
     cell = of_layers(model)
+    if model == "superelements":  # with the shapes that `effective` takes
+        cell = fd.UnitCell(fd.Case(cell.case.structure.for_stresses), cell.vectors)
     found, phase = fd.effective(cell), 1e-3 * np.array([0.6, -0.3, 0.8])
     voigt = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])
     stiffness = found.stiffness.values[voigt][:, :, voigt]

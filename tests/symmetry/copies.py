@@ -292,7 +292,7 @@ FIELDS: Mapping[str, Callable[[Copy, Any], Any]] = {
     **dict.fromkeys(("length_scale_ratio", "fraction", "change", "expansion"), Copy.same),
     **dict.fromkeys(("stiffness", "rest_length", "coefficient", "alpha", "beta"), Copy.same),
     **dict.fromkeys(("bending", "pretension", "stiffness_history", "release"), Copy.same),
-    **dict.fromkeys(("until", "Stop.damping"), Copy.same),
+    **dict.fromkeys(("until", "Stop.damping", "sliding_speed"), Copy.same),
     **dict.fromkeys(("ratios", "times", "onset", "yield_moment", "isotropic"), Copy.same),
     **dict.fromkeys(("kinematic", "barrier_moment", "rate", "friction"), Copy.same),
     **dict.fromkeys(("added_mass", "drag", "drag_coefficient", "resolution"), Copy.same),

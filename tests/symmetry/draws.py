@@ -36,8 +36,10 @@ EXTRAS = ("springs", "memory", "contact", "air", "all")  # the last: the others 
 MOST_NODES = 120  # of shells with a vertex radius, for time
 TRIES = 12  # of a part, until the library takes it
 SMALL = 0.02  # of the pattern's size: displacements
-ALWAYS = {"BaseMotion.value", "Air.density", "Air.resolution"}
-"""Drawn: a meter by default is as large as the sheet, air is light, and its flow takes long."""
+ALWAYS = {"BaseMotion.value", "Air.density", "Air.resolution", "Cable.sliding_speed"}
+"""Drawn: a meter by default is as large as the sheet, air is light, and its flow takes long.
+
+Friction that sets in at 1 mm/s needs finer steps than these motions have."""
 LEAST = 1e-6  # of that size: the largest displacement, or there is nothing to compare
 STEPS = 40  # of implicit methods; as many samples, so that contact is seen when it sets in
 
@@ -151,6 +153,8 @@ FIELDS: Mapping[str, Callable[[Scene, dict], Any]] = {
     "bending": lambda s, _: s.positive(s.force * s.size**2),
     "Spring.change": lambda s, _: s.about(SMALL * s.size),
     "Cable.change": lambda s, _: s.about(SMALL * s.size),
+    "Cable.friction": lambda s, _: s.positive(0.3),
+    "Cable.sliding_speed": lambda s, _: s.rng.uniform(0.1, 0.5) * s.size / s.time,
     "stiffness_history": lambda s, _: drawn(s, HISTORIES.values()),
     "Dashpot.coefficient": lambda s, _: s.positive(s.mass / s.time),
     "CreaseDamping.coefficient": lambda s, _: s.positive(s.force * s.time),

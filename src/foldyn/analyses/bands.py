@@ -32,11 +32,10 @@ from foldyn.errors import InputError, renamed
 from foldyn.linear import UnitCell, attenuation, band_gaps, bands, damped_bands
 from foldyn.linear.band_structure import ALL
 from foldyn.report.album import Album, ByRule, computation
-from foldyn.report.sections import Heading, Table
-from foldyn.report.sections import Section as PageSection
+from foldyn.report.sections import Heading, Section, Table
 from foldyn.report.sections import Text as PageText
-from foldyn.results.dataset import bands_dataset
-from foldyn.results.quantities import BANDS, GAPS
+from foldyn.results.dataset import result_dataset
+from foldyn.results.quantities import BANDS, GAPS, variables
 
 AROUND = {1: "G-X", 2: "G-X-M-Y-G", 3: "G-X-M-Y-G-Z-U-R-T-Z"}
 """Default paths around the zone, by its number of dimensions."""
@@ -125,7 +124,7 @@ class BandsAnalysis(Analysis):
         )
 
     @staticmethod
-    def sections(case_file: Any, results: ByRule, album: Album) -> Iterator[PageSection]:
+    def sections(case_file: Any, results: ByRule, album: Album) -> Iterator[Section]:
         """See `Analysis`."""
         first = next(iter(results))
         result = results[first]
@@ -238,7 +237,8 @@ def _joined(
     if "holds_to" in first.attrs:
         facts["holds_to"] = min(one.attrs["holds_to"] for one in found)
     facts["wall_seconds"] = sum(one.attrs["wall_seconds"] for one in found)
-    return bands_dataset(case, values, gaps, along, facts)
+    data = variables(BANDS, () if vary is None else ("state",), values)
+    return result_dataset("bands", case, data | variables(GAPS, "gap", gaps), along, facts)
 
 
 MOST_GAPS = 200

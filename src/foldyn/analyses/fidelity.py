@@ -22,8 +22,7 @@ from foldyn.linear.compared import WITHIN, against, legend, percent
 from foldyn.linear.fidelity import MODELS, REFERENCES, comparison, named
 from foldyn.linear.shell_of import checked_divisions
 from foldyn.report.album import Album, ByRule
-from foldyn.report.sections import Heading, Table, Text
-from foldyn.report.sections import Section as PageSection
+from foldyn.report.sections import Heading, Section, Table, Text
 from foldyn.tables import ListOf
 from foldyn.values import show
 
@@ -97,7 +96,7 @@ class FidelityAnalysis(Analysis):
         return str(Fidelity(result))
 
     @staticmethod
-    def sections(case_file: CaseFile, results: ByRule, album: Album) -> Iterator[PageSection]:
+    def sections(case_file: CaseFile, results: ByRule, album: Album) -> Iterator[Section]:
         """See `Analysis`."""
         (first, result), *_ = results.items()
         found = Fidelity(result)

@@ -40,25 +40,23 @@ def write_folding_page(
         The file written.
     """
     way = folding.path
+    begun = "the folded state" if folding.started_from == "folded" else "the pattern as it is"
+    cost = cost_rows(way.attrs["foldyn_version"], call or Call())
     farthest = np.linalg.norm(way["displacement"].values[-1], axis=1).argmax()
     sections = [
         stage({"folding": way}, {}, title, [int(farthest)]),
         Heading("How it folds"),
         *(Text(f"{line[:1].upper()}{line[1:]}.") for line in folding.report().splitlines()),
-        _states(folding),
+        Picture(
+            plots.draw_folding(folding),
+            "States on the way, the first one in gray, with the smallest and largest angle by "
+            "which mountains and valleys are folded.",
+        ),
         _numbers(folding),
         Heading("How it was computed"),
-        _computed(folding, call or Call()),
+        inputs_table([("starts from", begun), *cost]),
     ]
     return write_report(sections, path, title=title)
-
-
-def _states(folding: Folding) -> Section:
-    return Picture(
-        plots.draw_folding(folding),
-        "States on the way, the first one in gray, with the smallest and largest angle by which "
-        "mountains and valleys are folded.",
-    )
 
 
 def _numbers(folding: Folding) -> Section:
@@ -79,9 +77,3 @@ def _numbers(folding: Folding) -> Section:
         "States: mean angles of the creases, valleys positive; the largest strain, and the largest "
         "turn within a panel",
     )
-
-
-def _computed(folding: Folding, call: Call) -> Section:
-    folded = folding.started_from == "folded"
-    begun = ("starts from", "the folded state" if folded else "the pattern as it is")
-    return inputs_table([begun, *cost_rows(folding.path.attrs["foldyn_version"], call)])

@@ -19,8 +19,7 @@ from foldyn.linear import character, mac, modes, pair_modes
 from foldyn.linear.compared import size
 from foldyn.plots.readings import chosen_modes
 from foldyn.report.album import Album, ByRule, computation, listed
-from foldyn.report.sections import Heading, Picture, Table, Text, cell
-from foldyn.report.sections import Section as PageSection
+from foldyn.report.sections import Heading, Picture, Section, Table, Text, cell
 
 FRAMES, FPS = 24, 12
 MOST_FILMED = 6
@@ -98,7 +97,7 @@ class ModesAnalysis(Vibration):
         )
 
     @staticmethod
-    def sections(case_file: CaseFile, results: ByRule, album: Album) -> Iterator[PageSection]:
+    def sections(case_file: CaseFile, results: ByRule, album: Album) -> Iterator[Section]:
         """See `Analysis`."""
         (first, modes), *others = results.items()
         case = case_file.case(first)

@@ -41,8 +41,7 @@ from foldyn.report.album import (
     shown_nodes,
     visible_scale,
 )
-from foldyn.report.sections import Charts, Heading, Picture, Table, Text, cell
-from foldyn.report.sections import Section as PageSection
+from foldyn.report.sections import Charts, Heading, Picture, Section, Table, Text, cell
 from foldyn.signals.spectra import MINIMUM_SAMPLES
 from foldyn.strength.resultants import check_stresses
 from foldyn.values import number
@@ -173,7 +172,7 @@ class MotionAnalysis(Analysis):
         )
 
     @staticmethod
-    def sections(case_file: CaseFile, results: ByRule, album: Album) -> Iterator[PageSection]:
+    def sections(case_file: CaseFile, results: ByRule, album: Album) -> Iterator[Section]:
         """See `Analysis`."""
         first = next(iter(results))
         case, trajectory = case_file.case(first), results[first]

@@ -87,7 +87,7 @@ def inputs(case_file: Any, case: Case, results: ByRule) -> list[tuple[str, str]]
         ("supports", _parts(case.supports)),
         ("loads", _parts(case.loads)),
         ("damping", damping_text(case)),
-        ("point masses", _point_masses(case) if case.masses else ""),
+        ("masses at nodes", _carried(case) if case.carried.nnz else ""),
         ("contact", _contact(case.contact) if case.contact else ""),
         ("air", _said(case.air) if case.air else ""),
         ("initial state", _listed(case_file.start_keys)),
@@ -134,8 +134,8 @@ def damping_text(case: Case) -> str:
     return "; ".join(parts)
 
 
-def _point_masses(case: Case) -> str:
-    """Sum of the point masses, and the number of nodes that carry them."""
+def _carried(case: Case) -> str:
+    """Sum of point masses and bars, and the number of nodes that carry them."""
     masses = case.point_masses
     count = int((masses > 0.0).sum())
     nodes = f"{count} node{'s' if count > 1 else ''}"

@@ -18,8 +18,7 @@ from foldyn.periodic import response_curve
 from foldyn.periodic.equation import Drive
 from foldyn.periodic.response import checked_range
 from foldyn.report.album import Album, ByRule, computation
-from foldyn.report.sections import Heading, Table
-from foldyn.report.sections import Section as PageSection
+from foldyn.report.sections import Heading, Section, Table
 from foldyn.tables import ListOf
 from foldyn.values import number
 
@@ -85,7 +84,7 @@ class ResponseAnalysis(Analysis):
         )
 
     @staticmethod
-    def sections(case_file: CaseFile, results: ByRule, album: Album) -> Iterator[PageSection]:
+    def sections(case_file: CaseFile, results: ByRule, album: Album) -> Iterator[Section]:
         """See `Analysis`."""
         first = next(iter(results))
         yield from album.structure(

@@ -140,7 +140,9 @@ def swept_sine(
             line, before = Line(first, last, duration), k * duration
             tell = overall(report, before, len(ways) * duration)
             stretch, run = _glide(case, line, settle, run, 1.0 / (PER_CYCLE * ends[1]), tell)
-            own = _amplitudes(stretch.time, measured(measure, stretch), line.cycles)
+            top, bottom = extremes(measured(measure, stretch))
+            cycle = np.searchsorted(stretch.time, line.cycles[:-1] * (1.0 - 1e-12))
+            own = 0.5 * (np.maximum.reduceat(top, cycle) - np.minimum.reduceat(bottom, cycle))
             rates = 1.0 / np.diff(line.cycles)
             glide = Glide(case, measure, line, settle, stretch, rates, own, run)
             found = jumps_between(way, rates, own, resolution)
@@ -263,12 +265,3 @@ def _glide(
     length = float(line.cycles[-1])
     interval = length / math.ceil(length / longest)
     return run.advanced(swept, length, interval, longest, report=report)
-
-
-def _amplitudes(
-    times: NDArray[np.float64], values: NDArray[np.float64], cycles: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """Half the difference between the extremes of the measure in each cycle."""
-    top, bottom = extremes(values)
-    first = np.searchsorted(times, cycles[:-1] * (1.0 - 1e-12))
-    return 0.5 * (np.maximum.reduceat(top, first) - np.minimum.reduceat(bottom, first))

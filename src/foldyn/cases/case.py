@@ -21,7 +21,7 @@ from foldyn.cases.damping import Damping, Rayleigh, dampings
 from foldyn.cases.history import CONSTANT, History, as_history, factor
 from foldyn.cases.latches import Latch
 from foldyn.cases.loads import LOADS, Gravity, Load
-from foldyn.cases.masses import PointMass, nodal_masses
+from foldyn.cases.masses import PointMass, carried_mass
 from foldyn.cases.springs import Bar, Cable, Elastic, Made
 from foldyn.cases.state import State
 from foldyn.cases.supports import SUPPORTS, Fix, Impose, Link, Support
@@ -183,7 +183,7 @@ class Case(Loaded, Damped):
             with faults.collected():
                 supported_points(self.structure, support, place)
         self._check_damping(faults)
-        for name in ("terms", "latches", "point_masses"):
+        for name in ("terms", "latches", "carried"):
             with faults.collected():
                 getattr(self, name)
         for place, load in self._loads():
@@ -333,22 +333,21 @@ class Case(Loaded, Damped):
 
     @cached_property
     def mass(self) -> sparse.csr_array:
-        """Nodal mass matrix (n, n), kg: structure and point masses.
+        """Nodal mass matrix (n, n), kg: structure, point masses and bars.
 
         Raises
         ------
         InputError
-            The sheet has no density, and there are no point masses.
+            The sheet has no density, and nodes carry nothing.
         """
-        if not self.masses:
+        if not self.carried.nnz:
             return self.structure.mass
-        points = sparse.csr_array(sparse.diags_array(self.point_masses))
         try:
-            return sparse.csr_array(self.structure.mass + points)
+            return sparse.csr_array(self.structure.mass + self.carried)
         except InputError:
             if self.structure.sheet.density is not None:
                 raise
-            return points  # a sheet without mass
+            return self.carried  # a sheet without mass
 
     @cached_property
     def free_mass(self) -> sparse.csr_array:
@@ -401,14 +400,19 @@ class Case(Loaded, Damped):
         return elements_of(self)
 
     @cached_property
+    def carried(self) -> sparse.csr_array:
+        """Mass matrix (n, n), kg, of point masses and bars."""
+        return carried_mass(self.masses, self.supports, self.structure)
+
+    @cached_property
     def point_masses(self) -> NDArray[np.float64]:
-        """Sum (n,) of the point masses on each node, kg."""
-        return read_only(nodal_masses(self.masses, self.structure))
+        """Mass (n,) that each node carries, kg: point masses, and halves of bars."""
+        return read_only(row_sums(self.carried))
 
     @cached_property
     def nodal_mass(self) -> NDArray[np.float64]:
         """Mass (n,) that moves with each node, kg: the row sums of the mass matrix."""
-        return self.structure.nodal_mass if not self.masses else read_only(row_sums(self.mass))
+        return read_only(row_sums(self.mass)) if self.carried.nnz else self.structure.nodal_mass
 
     @property
     def total_mass(self) -> float:

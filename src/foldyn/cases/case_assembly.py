@@ -17,9 +17,11 @@ from foldyn.cases.damping import CreaseDamping, Damping, ModalDamping, Rayleigh,
 from foldyn.cases.directions import AXES, unit_vector
 from foldyn.cases.history import History
 from foldyn.cases.loads import Gravity, Load
+from foldyn.cases.springs import Cable, rubbing
 from foldyn.cases.stops import Stop, StopDampersTerm, stop_dampers
 from foldyn.cases.supports import BaseMotion, Fix, Impose, Link
 from foldyn.errors import Faults, InputError
+from foldyn.mechanics.capstan import CapstanTerm
 from foldyn.mechanics.following import Following, pushes
 from foldyn.mechanics.term import Term
 from foldyn.structures.discretized import Discretized, read_only
@@ -395,6 +397,11 @@ class Damped(Supported):
         """The damping of end stops; None without any."""
         return stop_dampers(list(self._supports(Stop)), self.structure)
 
+    @cached_property
+    def rubbing_cables(self) -> CapstanTerm | None:
+        """The friction of cables; None without any."""
+        return rubbing(list(self._supports(Cable)), self.structure)
+
     @property
     def damped_at_start(self) -> bool:
         """Whether any damping refers to the state in which a motion begins."""
@@ -407,7 +414,8 @@ class Damped(Supported):
         modal = self.modal_damping is not None and bool(np.any(self.modal_damping.ratios))
         dashpots = any(dashpot.coefficient > 0.0 for _, dashpot in self.dashpots)
         strain = self.strain_damping > 0.0
-        others = strain or bool(self.crease_damping.any()) or self.damped_stops is not None
+        terms = self.damped_stops is not None or self.rubbing_cables is not None
+        others = strain or bool(self.crease_damping.any()) or terms
         return rayleigh or modal or dashpots or others
 
 

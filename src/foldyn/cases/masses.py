@@ -1,17 +1,18 @@
-"""Point masses, which nodes carry in addition to the mass of the sheet."""
+"""What nodes carry in addition to the mass of the sheet: point masses and struts."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
-from numpy.typing import NDArray
+from scipy import sparse
 
 from foldyn.arguments import Check
 from foldyn.cases.decode import Part, PartOf
 from foldyn.cases.selection import Nodes, resolve_nodes
+from foldyn.cases.springs import Bar
 from foldyn.structures.discretized import Discretized
 from foldyn.values import number
 
@@ -35,12 +36,23 @@ class PointMass(Part):
     mass: Annotated[float, Check(number, above=0.0, unit="kg")]
 
 
-def nodal_masses(masses: Sequence[PointMass], structure: Discretized) -> NDArray[np.float64]:
-    """Sum (n,) of point masses on each node, kg."""
+def carried_mass(
+    masses: Sequence[PointMass], supports: Sequence[Any], structure: Discretized
+) -> sparse.csr_array:
+    """Mass matrix (n, n), kg, of point masses, and of bars, which stay straight."""
     total = np.zeros(len(structure.nodes))
     for i, part in enumerate(masses):
         total[resolve_nodes(structure, part.nodes, f"masses[{i}].nodes")] += part.mass
-    return total
+    pairs, each = [], []
+    for i, part in enumerate(supports):
+        for k, pair in enumerate(part.between if isinstance(part, Bar) and part.mass else ()):
+            pairs.append(resolve_nodes(structure, pair, f"supports[{i}].between[{k}]"))
+            each.append(part.mass / 6.0)
+    ends = np.reshape(pairs, (-1, 2)).astype(int)
+    rows, columns = np.repeat(ends, 2, axis=1).ravel(), np.tile(ends, 2).ravel()
+    blocks = np.multiply.outer(each, [2.0, 1.0, 1.0, 2.0]).ravel()
+    strung = sparse.csr_array((blocks, (rows, columns)), 2 * total.shape)
+    return sparse.csr_array(sparse.diags_array(total) + strung)
 
 
 MASS = PartOf((PointMass,), "masses")

@@ -16,7 +16,8 @@ from foldyn.cases.decode import Factor, Part
 from foldyn.cases.directions import Direction, Pairs
 from foldyn.cases.history import CONSTANT, STEADY, History
 from foldyn.cases.selection import Nodes, refuse_linear, resolve_nodes
-from foldyn.errors import FoldynWarning, InputError, warn
+from foldyn.errors import FoldynWarning, InputError, quietly, warn
+from foldyn.mechanics.capstan import CapstanTerm
 from foldyn.mechanics.lines import GROUND, Lines
 from foldyn.mechanics.springs import Springs, SpringsTerm
 from foldyn.structures.discretized import Discretized
@@ -213,6 +214,8 @@ class Bar(Elastic):
     bending : float, optional
         EI (N m2) about the weakest axis. With it, paths and motions warn where a bar is pressed
         with more than its buckling load, pi^2 EI / L^2 (Euler).
+    mass : float
+        Mass (kg) of each bar, spread evenly along it: m/6 [2 1; 1 2] at its ends.
     """
 
     between: Annotated[Pairs, Key("bar")]
@@ -223,6 +226,7 @@ class Bar(Elastic):
     bending: Annotated[float | None, Check(number, above=0.0, unit="N m2"), Key("bar_bending")] = (
         None
     )
+    mass: Annotated[float, Check(number, least=0.0, unit="kg"), Key("bar_mass")] = 0.0
 
     missing = {"bar_stiffness": "give EA (N) of the bars"}
     apart = "bars are a support of their own"
@@ -273,9 +277,9 @@ def _points(name: str, value: Any) -> tuple[Any, ...]:
 class Cable(Elastic):
     """A cable over several points, with the same tension everywhere; slack, it has no force.
 
-    It slides over the points between its ends without friction, as over small pulleys. Its tension
-    is EA (l/l0 - 1), with l the length of the line through the points and l0 its length without
-    force, which a winch can change.
+    It slides over the points between its ends, without friction as over small pulleys, or with it.
+    Its tension is EA (l/l0 - 1), with l the length of the line through the points and l0 its length
+    without force, which a winch can change; with friction, this is the mean over its length.
 
     Parameters
     ----------
@@ -291,9 +295,16 @@ class Cable(Elastic):
         Change of l0 (m) at factor 1 of the history: negative to wind the cable in.
     history : History or callable, optional
         Factor of time of this change; constant by default. In paths, the load factor instead.
+    friction : float
+        Coefficient mu of friction on the points in between, at least 0; for motions. Where the
+        cable slides and turns by the angle a, the tensions are in the ratio exp(mu a).
+    sliding_speed : float
+        Speed (m/s) below which friction fades, above 0: much below it, the cable creeps.
 
     Notes
     -----
+    With friction, a winch is at the last point.
+
     A cable that is just taut at rest counts as taut in small vibrations and at the start of paths.
     """
 
@@ -305,18 +316,28 @@ class Cable(Elastic):
     pretension: Annotated[float | None, Check(number, least=0.0, unit="N")] = None
     change: Annotated[float, Check(number, unit="m"), Key("cable_change")] = 0.0
     history: Factor = STEADY
+    friction: Annotated[float, Check(number, least=0.0), Key("cable_friction")] = 0.0
+    sliding_speed: Annotated[
+        float, Check(number, above=0.0, unit="m/s"), Key("cable_sliding_speed")
+    ] = 1e-3
 
     missing = {"cable_stiffness": "give EA (N) of the cable"}
     apart = "a cable is a support of its own"
 
     def agree(self) -> None:
-        """Refuse two lengths, and a history without a change."""
+        """Refuse two lengths, a history without a change, and friction without a point for it."""
         if self.rest_length is not None and self.pretension is not None:
             raise InputError(
                 f" = {self.pretension:g}: it follows from rest_length; give one of the two",
                 "pretension",
             )
         _check_winch(self.change, self.history)
+        if self.friction and len(self.nodes) < 3:
+            raise InputError(
+                f" = {self.friction:g}: a cable of two points slides over none; leave it out, or "
+                "give the points in between",
+                "friction",
+            )
 
     def add_to(self, made: Made, place: str) -> None:
         """See `Elastic`."""
@@ -353,6 +374,15 @@ class Cable(Elastic):
         return node.astype(np.int64), np.array(fixed, float)
 
 
+def rubbing(parts: Sequence[tuple[str, Cable]], structure: Discretized) -> CapstanTerm | None:
+    """Friction of cables, each with its place; None without any."""
+    rubs = [(place, part) for place, part in parts if part.friction]
+    with quietly():  # the springs of the case have warned
+        springs = Elastic.term(rubs, structure)
+    rub = np.array([(part.friction, part.sliding_speed) for _, part in rubs])
+    return CapstanTerm(springs, rub) if rubs else None
+
+
 def _following(case: Any, *keys: str) -> Iterator[str]:
     """Fields of springs and cables that follow a history."""
     for i, support in enumerate(case.supports):
@@ -362,7 +392,8 @@ def _following(case: Any, *keys: str) -> Iterator[str]:
 
 
 def refuse_driven(case: Any, name: str) -> None:
-    """Refuse springs and cables that follow a history, for an analysis of this name."""
+    """Refuse springs and cables that follow a history or rub, for an analysis of this name."""
+    refuse_rubbing(case)
     for field in _following(case, "history", "stiffness_history"):
         raise InputError(
             f": springs and cables that follow a history have no place in {name}; leave the "
@@ -371,8 +402,20 @@ def refuse_driven(case: Any, name: str) -> None:
         )
 
 
+def refuse_rubbing(case: Any) -> None:
+    """Refuse cables that rub, where nothing slides."""
+    for i, support in enumerate(case.supports):
+        if getattr(support, "friction", 0.0):
+            raise InputError(
+                f" = {support.friction:g}: friction needs a motion, which tells where a cable "
+                "slides; leave it out, or take simulate",
+                f"supports[{i}].friction",
+            )
+
+
 def refuse_varying(case: Any) -> None:
-    """Refuse springs whose stiffness varies in time, where there is no time."""
+    """Refuse cables that rub and springs whose stiffness varies, where there is no time."""
+    refuse_rubbing(case)
     for field in _following(case, "stiffness_history"):
         raise InputError(
             ": only motions have a time in which a stiffness can vary; leave it out", field

@@ -83,25 +83,6 @@ def raw_stamp(folder: Path) -> bytes | None:
         return None
 
 
-def write_stamp(
-    folder: Path, owner: Owner, state: str, results: Sequence[str], outdated: Sequence[str] = ()
-) -> None:
-    """Stamp a folder.
-
-    Parameters
-    ----------
-    folder : Path
-    owner : Owner
-    state : {"running", "stopped", "complete"}
-        "running" without a running process means that the run was cut off.
-    results, outdated : sequence of str
-        Files of this run; files of an earlier run, removed when this run saves its first file.
-    """
-    stamp = {"foldyn_version": __version__, **asdict(owner), "state": state}
-    stamp |= {"results": list(results), "outdated": list(outdated)}
-    write_text(json.dumps(stamp, indent=1) + "\n", folder / STAMP)
-
-
 def named_owner(stamp: dict[str, Any], folder: Path) -> str:
     """Return the owner named in a stamp, in the words a user would type."""
     source = stamp["source"]
@@ -239,7 +220,9 @@ class Results:
         return f"\nfoldyn: kept what was computed: {', '.join(self.kept)}{further}"
 
     def _stamp(self, state: str) -> None:
-        write_stamp(self.folder, self.owner, state, self._new, self._old)
+        stamp = {"foldyn_version": __version__, **asdict(self.owner), "state": state}
+        stamp |= {"results": self._new, "outdated": self._old}
+        write_text(json.dumps(stamp, indent=1) + "\n", self.folder / STAMP)
         self._begun = True
 
 

@@ -49,7 +49,7 @@ LEVELS = (
 """Levels 1 to 5; each contains the lower ones."""
 HIGHEST = LEVELS[-1]
 FOR_STRESSES = Level(9, 18, 16, 6)
-"""Shapes with which stresses near the corners converge; energies hardly change beyond level 5."""
+"""Shapes with which stresses near corners converge, and the stiffness of thin repeated sheets."""
 FOR_BUCKLING = HIGHEST._replace(turns=FOR_STRESSES.turns)
 """Shapes for load factors: panels bend sharply at creases that bulge near vertices."""
 SHAPES = (ALONG, ACROSS, ACROSS)

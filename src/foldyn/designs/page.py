@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -57,7 +56,11 @@ def write_design(
     for name, values in designs.items():
         with suppress(FoldynError):  # the guess may not give a case
             cases[name] = evaluator.case(values)
-    sections: list[Section | Stage] = [*_stages(plan, cases, designs, case_file)]
+    title = f"{case_file.heading}: a design"
+    sections: list[Section | Stage] = []
+    if case_file.analysis.kind in SHOWN:
+        results = {name: evaluator.result(designs[name]) for name in cases}
+        sections.append(stage(results, cases, title, case_file.output.nodes.tolist()))
     sections += [Heading("The best design"), Text(_verdict(found, plan)), _parameters(found, plan)]
     if found.constraints:
         sections.append(_constraints(found, plan))
@@ -76,18 +79,7 @@ def write_design(
     sections += [Heading("How it was computed"), inputs_table(_rows(found, plan, case_file, call))]
     if text := (case_file.text or case_file.path.read_text("utf-8")):
         sections.append(Listing(f"The case file {case_file.path.name}", text))
-    title = f"{case_file.heading}: a design"
     return write_report(sections, Path(folder) / "report.html", title=title)
-
-
-def _stages(
-    plan: Plan, cases: dict[str, Case], designs: dict[str, Any], case_file: CaseFile
-) -> Iterator[Stage]:
-    """Results of the best design and of the first guess, side by side."""
-    if case_file.analysis.kind not in SHOWN:
-        return
-    results = {name: plan.evaluator.result(designs[name]) for name in cases}
-    yield stage(results, cases, f"{case_file.heading}: a design", case_file.output.nodes.tolist())
 
 
 def _verdict(found: Design, plan: Plan) -> str:

@@ -74,7 +74,7 @@ def damping_matrix(
 
 
 def dampers(case: Case, quasi_static: bool = False) -> list[Term]:
-    """Dashpots, damped creases and strain damping of a case, on its m dofs.
+    """Dashpots, damped creases, stops and strains, and rubbing cables of a case, on its m dofs.
 
     Dampers of creases between compliant panels are left out: their hinges have memory instead
     (`Case.remembering`). In slow motions such a hinge is damped by the damper of its crease times
@@ -110,7 +110,7 @@ def dampers(case: Case, quasi_static: bool = False) -> list[Term]:
     elements = _elements(case, body, ends, np.concatenate(strength), quasi_static)
     if len(elements.coefficient):
         terms.append(ViscousTerm(elements))
-    terms += [] if case.damped_stops is None else [case.damped_stops]
+    terms += [own for own in (case.damped_stops, case.rubbing_cables) if own is not None]
     strains = body.strains() if case.strain_damping else None
     for own in () if strains is None else strains.membranes:
         resisting = own._replace(stiffness=case.strain_damping * own.stiffness)

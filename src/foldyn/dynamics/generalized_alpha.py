@@ -154,6 +154,8 @@ class Alpha(Scheme):
             done += _actuation(self.context, self.folds, self.part.fold_angle)
         if len(self.driven):
             done += _driving(self.context, self.driven, self.displacement(), self.moved(), h)
+            # what winches do against friction has been taken off what it dissipates
+            lost += _driving(self.context, self.rubbing, self.displacement(), self.moved(), h)
         return done, lost, to_air
 
     def change(self, h: float) -> NDArray:
@@ -297,11 +299,12 @@ def _driving(step, driven, u0, u1, h):
         for k in range(s.factor.shape[0]):
             s.factor[k, 0] = step.new.factor[k, 0] if after else step.old.factor[k, 0]
             s.factor[k, 1] = (step.new.factor[k, 0] - step.old.factor[k, 0]) / h
-        u = u1 if after else u0
+        u, end = (u1, step.new) if after else (u0, step.old)
+        carry(step.case.system.moved, end.factor[:, 1], end.w, s.velocity)
         for k in driven:
             own, terms.powers[0] = terms.context[k], 0.0
             run_at(terms.kernel[k, PLACE_OBSTACLES], (own, s.factor))
-            run_at(terms.kernel[k, FORCES], (own, u, u, 0.0, step.out, terms.powers))
+            run_at(terms.kernel[k, FORCES], (own, u, s.velocity, 0.0, step.out, terms.powers))
             done += 0.5 * h * terms.powers[0]
     s.time[0] = np.nan  # the histories are to be evaluated again
     return done

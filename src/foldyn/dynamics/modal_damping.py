@@ -130,7 +130,7 @@ def about(case: Case, start: Origin | None) -> tuple[NDArray, Assembly]:
 def mass_of(case: Case) -> sparse.csr_array:
     """Mass (m, m) of all dofs: the nodal mass, zero for other dofs, or the mass of the sheet."""
     own = case.elastic_body.sheet.mass
-    nodal = case.mass if own is None else sparse.diags_array(case.point_masses)
+    nodal = case.mass if own is None else case.carried
     mass = sparse.csr_array(sparse.kron(nodal, sparse.eye_array(3), format="csr"))
     mass.resize((case.elastic_body.size, case.elastic_body.size))
     return mass if own is None else sparse.csr_array(mass + own)

@@ -24,7 +24,7 @@ from scipy.sparse import linalg
 
 from foldyn.algebra.superlu import SingularTangentError, factorize
 from foldyn.cases import Case, Rayleigh
-from foldyn.dynamics.dampers import damping_matrix
+from foldyn.dynamics.dampers import dampers, damping_matrix
 from foldyn.dynamics.hereditary import instant_stiffness
 from foldyn.dynamics.inertia import is_lumped
 from foldyn.dynamics.softening import check_lost, lost_stiffness
@@ -175,7 +175,7 @@ def frequency_bound(case: Case, u: ArrayLike | None = None) -> float:
 
 def damper_rate(case: Case, u: ArrayLike | None = None) -> float:
     """Largest damping rate (1/s) of dashpots, creases and strain damping about u (n, 3)."""
-    if not case.dashpots and not case.crease_damping.any() and not case.strain_damping:
+    if not dampers(case):
         return 0.0
     damping = damping_matrix(case, case.body.dofs(_state(case, u)), most=True)
     return _quotient_of(case, damping, *_moving(case))

@@ -142,7 +142,7 @@ def pack(
             histories.append(history)
     modal = modal_rows(case, start) if modal is None else modal
     terms = [*damping_terms(case, start, modal), *air_terms(case, histories)]
-    body, by = _driven(case, histories).with_terms(*terms).renumbered()
+    body, by = _driven(case, histories, terms).renumbered()
     nodal = by.matrix(case.mass)
     ties = ties_of(case.constraints, by)
     mass = inertia(nodal, by.held(case.fixed), ties, hidden)
@@ -187,11 +187,12 @@ def pack(
     return PackedCase(body, system, mass, callbacks, by, modal, added, heat)
 
 
-def _driven(case: Case, histories: list[History]) -> Assembly:
-    """Body of a case, whose springs and obstacles follow the given histories."""
+def _driven(case: Case, histories: list[History], terms: Sequence[Any]) -> Assembly:
+    """Body of a case with more terms, whose springs and obstacles follow the given histories."""
     rows = {plane: histories.index(history) for plane, history in case.obstacle_terms}
     body = case.body if not rows else case.elastic_body.with_terms(case.contact_term.driven(rows))
-    return body.driven_by(histories) if case.elastic_body.histories else body
+    body = body.with_terms(*terms)
+    return body.driven_by(histories) if body.histories else body
 
 
 def _entries(terms, histories) -> Entries:

@@ -28,7 +28,6 @@ from foldyn.values import whole
 from foldyn.writing import write_text
 
 DIVISIONS = 16  # gives frequencies of the case studies within 1 %
-DECKS = "exports.md#input-decks"  # page
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,7 +222,7 @@ def _joints(shell: Shell, split: _Split) -> tuple[Joint, ...]:
     return tuple(found)
 
 
-def fold_slopes(structure: Discretized, page: str = DECKS) -> NDArray:
+def fold_slopes(structure: Discretized) -> NDArray:
     """Slope (nf,) of the law of each fold at rest, divided by the stiffness of the fold.
 
     Raises
@@ -256,7 +255,7 @@ def fold_slopes(structure: Discretized, page: str = DECKS) -> NDArray:
         warn(
             f"fold_law = {law}: {len(curved)} of {len(rest)} folds are not linear about rest; they "
             "become linear springs with the slope at rest: frequencies are right, statics are not",
-            page,
+            "exports.md#input-decks",
         )
     return slope
 
@@ -322,5 +321,5 @@ def _check(case: Case) -> None:
     if left:
         warn(
             f"{' and '.join(left)} are left out: they change neither frequencies nor statics",
-            DECKS,
+            "exports.md#input-decks",
         )

@@ -35,7 +35,6 @@ from foldyn.patterns.topology import components
 from foldyn.values import one_or_each
 from foldyn.writing import write_text
 
-PAGE = "exports.md#mujoco"
 Pin = tuple[int, int, int]
 Joint = tuple[int | None, int, int]
 WORLD = 0  # number of the body that does not move
@@ -207,7 +206,7 @@ def _trees(ends: NDArray, order: list[int]) -> tuple[list[Joint], list[Joint]]:
 
 def _stiffness(case: Case) -> NDArray:
     """Stiffness (nc,) of the creases alone, N m/rad, without that of their panels."""
-    folds, slopes = case.structure.body.sheet.fold_hinges(), fold_slopes(case.structure, PAGE)
+    folds, slopes = case.structure.body.sheet.fold_hinges(), fold_slopes(case.structure)
     alone = folds.stiffness / (1.0 - folds.softness * folds.stiffness)
     return np.bincount(folds.fold, alone, len(slopes)) * slopes
 
@@ -304,5 +303,5 @@ def _check(case: Case) -> None:
     if left:
         warn(
             f"the model of MuJoCo leaves out {', '.join(sorted(left))}; add what you need there",
-            PAGE,
+            "exports.md#mujoco",
         )

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -29,11 +28,9 @@ def bezier(control: ArrayLike, tolerance: float) -> NDArray[np.float64]:
     degree = len(points) - 1
     bend = np.linalg.norm(np.diff(points, 2, axis=0), axis=1).max() * degree * (degree - 1)
     count = chords(math.sqrt(bend / (8 * tolerance)))
-    t = np.linspace(0.0, 1.0, count + 1)[:, None]
-    level: Sequence[NDArray] = list(points)
-    while len(level) > 1:
-        level = [(1 - t) * a + t * b for a, b in pairwise(level)]
-    return np.broadcast_to(level[0], (count + 1, 2))
+    from scipy.interpolate import BPoly  # slow to import
+
+    return BPoly(points[:, None], [0.0, 1.0])(np.linspace(0.0, 1.0, count + 1))
 
 
 def arc_chords(radius: float, sweep: float, tolerance: float) -> int:

@@ -10,7 +10,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from foldyn.errors import InputError
+from foldyn.errors import InputError, listed
 from foldyn.values import parsed, show
 
 METERS = {
@@ -169,8 +169,7 @@ class Notes:
         for k, source in enumerate(sources):
             where = f" near {self.point(points[k])}" if len(points) else ""
             names.setdefault(self.line(int(source)) + where)
-        more = f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else ""
-        return ", ".join(list(names)[:_SHOWN]) + more
+        return listed([*names], _SHOWN)
 
     def contradict(self, pairs: Sequence[tuple[int, int]]) -> None:
         """Report pairs of coincident lines where one is a mountain and the other a valley."""

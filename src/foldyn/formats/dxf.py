@@ -90,7 +90,8 @@ def read(text: str) -> Drawing:
             curved += path.has_curves
     return chords.drawing(
         curved, np.nan, skipped,
-        meters=_meters(document), assumed=1e-3, doubts=tuple(color_doubts(colors)),
+        meters=METERS.get(_UNITS.get(document.header.get("$INSUNITS", 0), "")), assumed=1e-3,
+        doubts=tuple(color_doubts(colors)),
     )  # fmt: skip
 
 
@@ -226,12 +227,6 @@ def _color(entity: Any, document: Any, layer: str) -> RGB:
         if index < 256:
             return aci2rgb(index)
     return 0, 0, 0
-
-
-def _meters(document: Any) -> float | None:
-    """Length of the unit (m) that the header names; None if it names none."""
-    unit = _UNITS.get(document.header.get("$INSUNITS", 0))
-    return None if unit is None else METERS[unit]
 
 
 def write(pattern: Pattern) -> str:

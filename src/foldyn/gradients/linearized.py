@@ -124,8 +124,10 @@ class Products:
                 for each in (z, x)
             )  # fmt: skip
             add_mass_products(sheet.parts, one, other, by, total["0.mass"])
-            product = (one * other)[: self._case.structure.nodes.size].reshape(-1, 3).sum(axis=1)
-            total["point_masses"] += by * product
+            size = self._case.structure.nodes.size
+            one, other = one[:size].reshape(-1, 3), other[:size].reshape(-1, 3)
+            row, column = self._case.carried.tocoo().coords
+            total["carried"] += by * (one[row] * other[column]).sum(axis=1)
             return
         one, other = (
             each if each.ndim > 1 else self._linear.expanded(each[:, None]).reshape(-1, 3)

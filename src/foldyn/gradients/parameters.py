@@ -41,7 +41,7 @@ LEAST = 1e-6  # changes below this fraction of a value are lost in round-off
 GOLDEN = 0.6180339887498949  # multiples of this number modulo 1 are all distinct
 # round-off of a change, relative to the number itself, and to the largest number of its array
 SILENT = 1e-11, 1e-12
-DIFFERENTIATED = "load.", "imposed.", "mass", "point_masses", "alpha", "beta"
+DIFFERENTIATED = "load.", "imposed.", "mass", "carried", "alpha", "beta"
 """Numbers of a case beside those of its body by which results have derivatives."""
 KINK = (
     "{}: the numbers of the case ({}) have a kink here: their slopes jump, such as where another "
@@ -67,7 +67,9 @@ def numbers_of(case: Case) -> Arrays:
         numbers["constraints"] = basis @ np.random.default_rng(0).uniform(1.0, 2.0, basis.shape[1])
     numbers["alpha"], numbers["beta"] = np.array([[case.rayleigh.alpha], [case.rayleigh.beta]])
     if case.structure.linear:
-        numbers["point_masses"] = case.point_masses
+        carried = case.carried
+        numbers["carried"] = carried.data
+        layout |= {"carried.columns": carried.indices, "carried.rows": carried.indptr}
     with suppress(InputError):  # statics needs no mass
         mass = sparse.csr_array(case.mass)
         mass.sort_indices()

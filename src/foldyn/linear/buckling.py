@@ -44,11 +44,7 @@ TURNS = np.radians(10.0)  # turn of a hinge from which displacements are not sma
 
 
 def buckling(
-    case: Case,
-    count: int = 6,
-    *,
-    preload: Load | Sequence[Load] | None = None,
-    iterations: int = 0,
+    case: Case, count: int = 6, *, preload: Load | Sequence[Load] | None = None, iterations: int = 0
 ) -> xarray.Dataset:
     """Load factors at which a case buckles, and the shapes, by linear buckling.
 

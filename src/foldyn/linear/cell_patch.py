@@ -211,7 +211,9 @@ def _structure(
             for k, (step, f) in enumerate(panels)
             if own.centers[f] >= 0
         }
-    return MODELS[own.kind].make(pattern, _sheet(own.sheet, panels), **options)
+    made = MODELS[own.kind].make(pattern, _sheet(own.sheet, panels), **options)
+    finer = getattr(own, "finer", None)  # shapes of superelements
+    return made if finer is None else replace(made, finer=finer).marked()
 
 
 def _copied(chosen: Iterable[int], panels: Sequence[Panel]) -> list[int]:

@@ -32,8 +32,8 @@ import numpy as np
 import xarray
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.sparse.linalg import splu
 
+from foldyn.algebra.superlu import SingularTangentError, unsymmetric
 from foldyn.cases import State
 from foldyn.errors import InputError, warn
 from foldyn.linear.linearized import amplitude_of, slope_change
@@ -41,6 +41,7 @@ from foldyn.linear.linearized_cell import LinearizedCell, linearize_cell
 from foldyn.linear.unit_cell import UnitCell
 from foldyn.linear.wave_solver import WaveSolver
 from foldyn.results.dataset import result_dataset
+from foldyn.strength.resultants import for_stresses
 from foldyn.values import of_kind
 
 STRAINS = ("xx", "yy", "xy")
@@ -126,7 +127,7 @@ def effective(
     True
     """
     began = time.perf_counter()
-    case = of_kind("cell", cell, UnitCell).case
+    case = for_stresses(of_kind("cell", cell, UnitCell).case)
     structure = case.structure
     if case.supports or getattr(structure.options, "clamped", ()):
         raise InputError(": has supports or clamped edges, and a free material has none", "cell")
@@ -531,8 +532,8 @@ def _solved(matrix: sparse.csc_array, push: NDArray, rigid: NDArray) -> NDArray:
     whole = sparse.csc_array(sparse.block_array([[matrix, border], [border.conj().T, None]]))
     load = -np.concatenate([push, np.zeros((count, push.shape[1]))]).astype(whole.dtype)
     try:
-        found = splu(whole).solve(load)
-    except RuntimeError:  # a zero pivot
+        found = unsymmetric(whole).solve(load)
+    except SingularTangentError:
         found = np.full_like(load, np.nan)
     left = np.abs(whole @ found - load).max(axis=0)
     if not (left <= LEFT * np.abs(load).max(axis=0) + ROUNDING * scale).all():

@@ -14,7 +14,7 @@ from scipy import sparse
 
 from foldyn.algebra.complex_symmetric import solve
 from foldyn.algebra.eigen import Pencil, Spectrum, lowest
-from foldyn.algebra.superlu import Factorization, factorize
+from foldyn.algebra.superlu import factorize
 from foldyn.algebra.woodbury import Squared
 from foldyn.arguments import Check, Checked, Flag
 from foldyn.dynamics import Progress
@@ -178,7 +178,12 @@ class ModalResponse:
             load = basis.shapes.T @ term.shape
             self._loads.append(load)
             if correction and factors is not None:
-                left.append(_residual(modes.pencil, basis, term.shape, load, factors, modes.shift))
+                pencil, shift = modes.pencil, modes.shift
+                whole = factors.solve(term.shape)
+                whole += factors.solve(
+                    term.shape - pencil.stiffness @ whole + shift * (pencil.mass @ whole)
+                )
+                left.append(whole - basis.shapes @ (load / (basis.values - shift * basis.inertia)))
             else:
                 left.append(np.zeros(modes.pencil.size))
         self.motions = np.column_stack([basis.shapes, *left])
@@ -315,14 +320,3 @@ def _shift(pencil: Pencil, basis: _Basis) -> float:
         return 0.0
     positive = modal[modal > 0.0]
     return float(modal[0] - BESIDE * (positive[0] if positive.size else pencil.scale))
-
-
-def _residual(
-    pencil: Pencil, basis: _Basis, shape: NDArray, load: NDArray, factors: Factorization,
-    shift: float,
-) -> NDArray:  # fmt: skip
-    """Static response (nf,) of the omitted modes."""
-    whole = factors.solve(shape)
-    left = shape - pencil.stiffness @ whole + shift * (pencil.mass @ whole)
-    whole = whole + factors.solve(left)
-    return whole - basis.shapes @ (load / (basis.values - shift * basis.inertia))

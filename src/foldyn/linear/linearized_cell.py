@@ -166,7 +166,7 @@ class CellReach:
 
     def projected(self, force: NDArray) -> NDArray[np.float64]:
         """Forces (r,), N, on `moves`."""
-        return self.moves.T @ force
+        return force[~self.held] if self.ties.empty else self.moves.T @ force
 
 
 @dataclass(frozen=True, eq=False)

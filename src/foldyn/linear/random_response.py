@@ -164,7 +164,9 @@ def random_response(
     check_memory("frequencies", f"densities at {len(at)} frequencies",
                  8.0 * COPIES * len(at) * size, "take fewer")  # fmt: skip
     total: dict[str, Found] = {}
-    for source in _sources(driven, amounts, together):
+    for noise in block_diag(np.eye(len(driven) - len(together)), together).T:
+        each = [(driven[k], float(noise[k]), amounts[k]) for k in np.flatnonzero(noise).tolist()]
+        source = Source(*zip(*each, strict=True))
         for name, found in mean_squares(source, at).items():
             known = total.get(name)
             total[name] = found if known is None else Found(*map(np.add, known, found))
@@ -252,18 +254,6 @@ def _coherence(given: ArrayLike, count: int) -> NDArray[np.float64]:
         )
     kept = values > FULL
     return vectors[:, kept] * np.sqrt(values[kept])
-
-
-def _sources(
-    driven: Sequence[Driven], amounts: Sequence[dict[str, Amounts]], together: NDArray
-) -> list[Source]:
-    """Independent sources: each axis of the base, and the noises from which forces are mixed."""
-    out = []
-    for noise in block_diag(np.eye(len(driven) - len(together)), together).T:
-        each = [(driven[k], float(noise[k]), amounts[k]) for k in np.flatnonzero(noise).tolist()]
-        drives, factors, own = zip(*each, strict=True)
-        out.append(Source(drives, factors, own))
-    return out
 
 
 def _warn_of_mass(system: Linearized, driven: Driven) -> None:

@@ -22,7 +22,7 @@ import xarray
 from numpy.typing import ArrayLike, NDArray
 
 from foldyn.cases import Case
-from foldyn.errors import InputError
+from foldyn.errors import InputError, listed
 from foldyn.patterns.pattern import Pattern
 from foldyn.patterns.screw import Screw, motion_between, translation
 from foldyn.patterns.tiling import half_edges
@@ -35,7 +35,6 @@ NEAR_MISS = 0.05  # a vertex this close to a partner, relative to the pattern's 
 Step = tuple[int, ...]  # R
 Vertex = tuple[Step, int]  # cell and kind
 COMMUTE = 10.0  # largest distance that the order of two motions may make, in tolerances
-SHOWN = 6  # most vertices named in a message
 HEXAGONAL = 1e-6  # tolerance for lengths and angle of a hexagonal lattice
 
 
@@ -215,10 +214,11 @@ class UnitCell:
             motion, off = motion_between(points, ends, near)
             wrong = rows[off > near]
             if len(wrong):
+                one, other = (listed(row) for row in wrong.T.tolist())
                 raise InputError(
-                    f": no motion brings vertices {_named(wrong[:, 0])} to "
-                    f"{_named(wrong[:, 1])}, which the pattern says is its period {k}: they are "
-                    f"off by up to {off.max():.2g} m; this shape does not repeat",
+                    f": no motion brings vertices {one} to {other}, which the pattern says is its "
+                    f"period {k}: they are off by up to {off.max():.2g} m; this shape does not "
+                    "repeat",
                     "case",
                 )
             found.append((rows, len(motions)))
@@ -443,8 +443,8 @@ def _check_all(
         ]  # fmt: skip
         if missed:
             raise InputError(
-                f": vertices {_named([v for v, _, _ in missed])} have no partner under motion {k}: "
-                f"they come near {_named([w for _, w, _ in missed])}, but are off by up to "
+                f": vertices {listed([v for v, _, _ in missed])} have no partner under motion {k}: "
+                f"they come near {listed([w for _, w, _ in missed])}, but are off by up to "
                 f"{max(gap for _, _, gap in missed):.2g} m; correct the pattern or the motion, or "
                 "give a larger tolerance",
                 field,
@@ -484,13 +484,6 @@ def _copies(count: int, dimensions: int, pairs: Sequence[tuple]) -> Copies:
         )
     kind = components(ends, count)
     return Copies(kind, offset, np.unique(kind, return_index=True)[1])
-
-
-def _named(vertices: Sequence[int] | NDArray) -> str:
-    """Vertices listed in a message."""
-    listed = [str(int(v)) for v in vertices]
-    more = f" and {len(listed) - SHOWN} more" if len(listed) > SHOWN else ""
-    return ", ".join(listed[:SHOWN]) + more
 
 
 def _check_memory(count: int, dimensions: int) -> None:

@@ -20,8 +20,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy import linalg, sparse
-from scipy.sparse.linalg import LinearOperator, eigsh, splu
+from scipy.sparse.linalg import LinearOperator, eigsh
 
+from foldyn.algebra.superlu import unsymmetric
 from foldyn.errors import ComputationError, InputError
 from foldyn.linear.bloch import Bloch, null_space
 from foldyn.threads import in_threads
@@ -236,7 +237,7 @@ class WaveSolver:
         whole, whole_mass = bloch.stiffness.sparse_at(factors), bloch.mass.sparse_at(factors)
         stiffness, mass = (part[kept][:, kept] for part in (whole, whole_mass))
         shift = -SHIFT * _scale(stiffness, mass)
-        factor = splu(sparse.csc_array(stiffness - shift * mass))
+        factor = unsymmetric(sparse.csc_array(stiffness - shift * mass))
         inverse = LinearOperator(stiffness.shape, factor.solve, dtype=complex)
         parts = np.random.default_rng(0).normal(size=(2, len(kept)))
         values, motions = eigsh(

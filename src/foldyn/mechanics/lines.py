@@ -111,7 +111,7 @@ def per_length(lines, s, tension, length):
 
 
 @inner_scalar
-def _add_pull(lines, i, pull, start, end, force):
+def add_pull(lines, i, pull, start, end, force):
     """Add the forces of a piece, `pull` (N/m) times the mean of its vectors at two states."""
     a, b = lines.node[i], lines.node[i + 1]
     for c in range(3):
@@ -134,7 +134,7 @@ def pull_lines(lines, u, force):
         k = strength(lines, s, 0.0)
         for i in range(lines.first[s], lines.first[s + 1] - 1):
             pull = per_length(lines, s, k * beyond, piece(lines, u, i)[1])
-            _add_pull(lines, i, pull, u, u, force)
+            add_pull(lines, i, pull, u, u, force)
         if lines.row[s, 0] >= 0 or lines.row[s, 1] >= 0:
             power += 0.5 * beyond * beyond * _rate_of_strength(lines, s, k)
             power -= k * beyond * lines.now[s, 1]
@@ -193,7 +193,7 @@ def pull_on_average(lines, u0, u1, h, force):
         tension = 0.5 * (soft + stiff) * mean
         for i in range(lines.first[s], lines.first[s + 1] - 1):
             both = 0.5 * (piece(lines, u0, i)[1] + piece(lines, u1, i)[1])
-            _add_pull(lines, i, per_length(lines, s, tension, both), u0, u1, force)
+            add_pull(lines, i, per_length(lines, s, tension, both), u0, u1, force)
         power += 0.5 * (before + after) * (stiff - soft) / h - tension * lines.now[s, 1]
     return power
 
@@ -258,11 +258,11 @@ def differentiate_lines(lines, out, u, weights, added):
             continue
         k, growth = strength(lines, s, 0.0), 0.0  # growth: rate of l for velocities `weights`
         for i in range(lines.first[s], lines.first[s + 1] - 1):
-            growth += _growth(lines, u, weights, i)[0]
+            growth += growth_of(lines, u, weights, i)[0]
         out.stretch[s] += k * growth
         out.stiffness[s] += beyond * growth
         for i in range(lines.first[s], lines.first[s + 1] - 1):
-            own, length = _growth(lines, u, weights, i)
+            own, length = growth_of(lines, u, weights, i)
             pull = per_length(lines, s, k * beyond, length)
             by_length = 0.0  # derivative by the length of the piece
             if length > 0.0:
@@ -281,7 +281,7 @@ def differentiate_lines(lines, out, u, weights, added):
 
 
 @inner_scalar
-def _growth(lines, u, weights, i):
+def growth_of(lines, u, weights, i):
     """Rate of a piece's length for velocities `weights`, and that length."""
     length, grown = piece(lines, u, i)[1], 0.0
     for c in range(3):
@@ -300,7 +300,7 @@ def until_turn(lines, u, v, a, h):
             continue
         beyond, rate, growth = extension(lines, u, s, 0.0), -lines.now[s, 1], 0.0
         for i in range(lines.first[s], lines.first[s + 1] - 1):
-            grown, length = _growth(lines, u, v, i)
+            grown, length = growth_of(lines, u, v, i)
             rate += grown
             squares = -grown * grown
             for c in range(3):

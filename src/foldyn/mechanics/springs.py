@@ -162,7 +162,8 @@ def _limit(own, u, v, a, h, beta, energy, lightness):
 
 
 @place_obstacles
-def _drive(own, factors):
+def drive_springs(own, factors):
+    """Set the springs and lines of a context to factors of its histories."""
     springs, found = own.springs, rows_at(factors, own.histories)
     for s in range(springs.row.size):
         if springs.row[s] >= 0:
@@ -215,7 +216,9 @@ class SpringsTerm(Term):
         own = Context(_Context(self.springs, group, int(part.own[1]), len(self.histories)))
         kernels = {FORCES: _forces, ENERGIES: _energies, MEAN_FORCES: _mean_forces}
         kernels |= {LIMIT: _limit} if self.springs.lines.slack.any() else {}
-        return CompiledTerm(own, kernels | ({PLACE_OBSTACLES: _drive} if self.histories else {}))
+        return CompiledTerm(
+            own, kernels | ({PLACE_OBSTACLES: drive_springs} if self.histories else {})
+        )
 
     def arrays(self) -> Arrays:
         """See `Term`."""
@@ -233,7 +236,7 @@ class SpringsTerm(Term):
         return Pulled(own, _pullback, arrays_of(out, *STEADY).numbers)
 
     @cached_property
-    def _dofs(self) -> list[NDArray]:
+    def dofs(self) -> list[NDArray]:
         """Dofs (3k,) of the k points of each line, negative on the ground."""
         dofs = (3 * self.springs.lines.node[:, None] + np.arange(3)).ravel()
         return np.split(dofs, 3 * self.springs.lines.first[1:-1]) if len(dofs) else []
@@ -242,11 +245,11 @@ class SpringsTerm(Term):
     def _line_places(self) -> NDArray:
         """Rows and columns (2, k) of the entries of the lines' blocks, negative on the ground."""
         none = np.zeros((2, 0), np.int64)
-        pairs = (np.stack(np.broadcast_arrays(d[:, None], d)).reshape(2, -1) for d in self._dofs)
+        pairs = (np.stack(np.broadcast_arrays(d[:, None], d)).reshape(2, -1) for d in self.dofs)
         return np.concatenate([none, *pairs], axis=1)
 
     @cached_property
-    def _moves(self) -> NDArray[np.bool_]:
+    def moves(self) -> NDArray[np.bool_]:
         """Mask (k,) of the entries of the lines' blocks without the ground."""
         return np.all(self._line_places >= 0, axis=0)
 
@@ -254,7 +257,7 @@ class SpringsTerm(Term):
     def places(self) -> tuple[NDArray, NDArray]:
         """See `Term`."""
         row, column = places_of(pairs_of_ends(self.springs.ends))
-        lines = self._line_places[:, self._moves]
+        lines = self._line_places[:, self.moves]
         return np.concatenate([row, lines[0]]), np.concatenate([column, lines[1]])
 
     def entries(self, q: NDArray, floor: float = -np.inf) -> NDArray:
@@ -268,9 +271,7 @@ class SpringsTerm(Term):
         along = np.einsum("s,sa,sb->sab", stiffness, direction, direction)
         lines = np.zeros(self._line_places.shape[1])
         line_blocks(springs.lines, nodal(q), loose, lines)
-        return np.concatenate(
-            [blocks_of_ends(self.springs.ends, along).ravel(), lines[self._moves]]
-        )
+        return np.concatenate([blocks_of_ends(self.springs.ends, along).ravel(), lines[self.moves]])
 
     def unstrained(self, q: NDArray) -> Unstrained:
         """See `Term`."""
@@ -319,7 +320,7 @@ class SpringsTerm(Term):
     def holds(self, q: NDArray) -> sparse.csr_array:
         """Internal constraints: directed springs, and lines to the ground; see `Term`."""
         nodes, rates = self._rows(q)
-        grounded = np.array([(each < 0).any() for each in self._dofs], bool)
+        grounded = np.array([(each < 0).any() for each in self.dofs], bool)
         acts = [*np.ones(len(self.springs.ends), bool), *(grounded & self._acts(q))]
         found = [pair for pair in compress(zip(nodes, rates, strict=True), acts) if pair[1].any()]
         for s in np.flatnonzero(self.tensions(q) > 0.0):  # taut pieces to the ground hold all ways

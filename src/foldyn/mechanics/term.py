@@ -136,6 +136,8 @@ class Term(ABC):
         Whether it owns some of the hidden dofs.
     damps : bool
         Whether its forces resist velocities, and all their work is dissipated or lost to the air.
+    symmetric : bool
+        Whether its tangent and its damping are symmetric.
     undifferentiated : str
         Name for messages that refuse gradients, for a term without `pulled`.
     without : tuple of str
@@ -149,6 +151,7 @@ class Term(ABC):
     shared: ClassVar[bool] = False
     owns_hidden: bool = False
     damps: ClassVar[bool] = False
+    symmetric: ClassVar[bool] = True
     undifferentiated: ClassVar[str] = ""
     without: ClassVar[tuple[str, ...]] = ()
     histories: tuple[Any, ...] = ()

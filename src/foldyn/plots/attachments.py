@@ -97,7 +97,8 @@ def _of_part(
             outside = axis if axis @ (points[a] - middle) > 0.05 * size and not axis[2] else -axis
             foot = points[a] + 1.5 * size * outside * (np.sign(axis[2]) or 1.0)
             lines.append(_zigzag(points[a], foot, 0.3 * size, view))
-            lines.append(_ground(points[a], foot, size, view))
+            across = 0.35 * size * view.across(foot - points[a])
+            lines.append(np.array([foot - across, foot + across]))  # the ground
     return lines
 
 
@@ -111,12 +112,6 @@ def _zigzag(start: Points, end: Points, width: float, view: View) -> Points:
     share = np.concatenate([[0.0], inner, [1.0]])
     offset = np.concatenate([[0.0], offset, [0.0]])
     return start + share[:, None] * line + width * offset[:, None] * view.across(line)
-
-
-def _ground(start: Points, foot: Points, size: float, view: View) -> Points:
-    """Ground line of a spring."""
-    across = 0.35 * size * view.across(foot - start)
-    return np.array([foot - across, foot + across])
 
 
 def _hatched(sheet: Sheet3D, points: Points, edges: Any, size: float) -> Points:

@@ -13,6 +13,7 @@ from foldyn.errors import InputError
 from foldyn.linear.band_structure import ALL, band_gaps, frequencies_of
 from foldyn.linear.cell_equilibrium import BY_STATE
 from foldyn.plots import style
+from foldyn.results import sweep_dataset
 from foldyn.values import flag, whole
 
 GAP = "0.88"  # gray of full gaps
@@ -103,7 +104,7 @@ def plot_iso_frequency(
         raise InputError(f" = {band}: there are {frequency.shape[1]} bands", "band")
     phases = bands["wave_vector"].values.reshape(*shape, 2)
     values = frequency[:, band - 1].reshape(*shape)
-    x, y, z = (_closed(each) for each in (phases[..., 0], phases[..., 1], values))
+    x, y, z = (np.pad(each, (0, 1), "wrap") for each in (phases[..., 0], phases[..., 1], values))
     x[-1], y[:, -1] = np.pi, np.pi
     labels = "phase along period 1 (rad)", "phase along period 2 (rad)"
     figure, axes = style.single((5.2, 4.4), title, *labels)
@@ -124,12 +125,6 @@ def _colored(along: np.ndarray, values: np.ndarray, shares: np.ndarray) -> LineC
     lines.set_array(0.5 * (shares[:-1] + shares[1:]).ravel())
     lines.set_clim(0.0, 1.0)
     return lines
-
-
-def _closed(values: np.ndarray) -> np.ndarray:
-    """Values (n, m) of a grid, closed by repeating at pi the values at -pi."""
-    values = np.concatenate([values, values[:1]])
-    return np.concatenate([values, values[:, :1]], axis=1)
 
 
 def _along(bands: xr.Dataset) -> tuple[np.ndarray, str]:
@@ -177,12 +172,6 @@ def plot_effective(effective: xr.Dataset, *, title: str = "") -> Figure:
     return figure
 
 
-def with_unit(values: xr.DataArray) -> str:
-    """The unit in parentheses, if there is one."""
-    unit = values.attrs.get("units", "1")
-    return "" if unit == "1" else f" ({unit})"
-
-
 def _draw_states(effective: xr.Dataset, title: str) -> Figure:
     """Draw the short variables against the states, each in its axes."""
     shown = [name for name in BY_STATE if name in effective]
@@ -196,12 +185,12 @@ def _draw_states(effective: xr.Dataset, title: str) -> Figure:
             (line,) = axes.plot(state.values, values, "o-", lw=1.4, ms=2.5, label=label)
             axes.plot(state[unstable], values[unstable], "o", ms=5, mfc="white", c=line.get_color())
         words = name.replace("poissons", "Poisson's").replace("_", " ")
-        axes.set_title(f"{words}{with_unit(own)}", fontsize="medium")
+        axes.set_title(sweep_dataset.label(own, words), fontsize="medium")
         if own.ndim > 1:
             axes.legend(fontsize="small")
         axes.locator_params(axis="x", nbins=4)
         if k >= len(shown) - 2:
-            axes.set_xlabel(f"{state.attrs['long_name']}{with_unit(state)}")
+            axes.set_xlabel(sweep_dataset.label(state))
     for axes in figure.axes[len(shown) :]:
         axes.set_axis_off()
     return figure

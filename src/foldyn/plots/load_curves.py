@@ -14,6 +14,7 @@ from foldyn import mechanics
 from foldyn.cases import Actuate, Case, CreaseMoment, Impose, Pressure, Temperature, resolve_nodes
 from foldyn.cases.directions import unit_vector
 from foldyn.cases.selection import resolve_creases, resolve_panels
+from foldyn.errors import listed
 from foldyn.plots.charts import Chart, Curve
 from foldyn.structures.discretized import Discretized
 
@@ -258,10 +259,7 @@ def describe(vectors: np.ndarray, unit_name: str) -> str:
 
 def _listed(what: str, numbers: list[int]) -> str:
     """List the first of some nodes or creases, as in "nodes 1, 2, 5 and 4 more"."""
-    listed = ", ".join(str(number) for number in numbers[:_LISTED])
-    if len(numbers) > _LISTED:
-        listed += f" and {len(numbers) - _LISTED} more"
-    return f"{what} {listed}" if len(numbers) == 1 else f"{what}s {listed}"
+    return f"{what}{'s' * (len(numbers) != 1)} {listed(numbers, _LISTED)}"
 
 
 def _direction(unit: np.ndarray) -> str:

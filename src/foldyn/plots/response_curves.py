@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 
 from foldyn.errors import InputError
 from foldyn.plots import style
+from foldyn.plots.chart_figures import figure_of
+from foldyn.plots.charts import Chart, Curve
 from foldyn.plots.readings import alone, by_label
 from foldyn.results.sweep_dataset import label
 
@@ -101,22 +103,18 @@ def plot_backbone(backbones: xr.Dataset | Mapping[str, xr.Dataset], title: str =
     labeled = by_label("backbones", backbones)
     for one in labeled.values():
         _kind("backbones", one, "backbone", "mode")
-    parts = ["amplitude", "energy"][: 1 + all("energy" in one for one in labeled.values())]
-    figure = style.new_figure(3.2 * len(parts) + 1.0, SIZE[1], title)
-    keys = []
-    for axes, name in zip(
-        np.atleast_1d(figure.subplots(1, len(parts), sharey=True)), parts, strict=True
-    ):
-        unit = {"amplitude": "amplitude (m)", "energy": "energy (J)"}[name]
-        style.frame(axes, unit, "frequency (Hz)" if name == "amplitude" else "")
-        axes.set_xscale("log")
-        keys = [
-            axes.plot(
-                one[name].values, one["frequency"].values, label=whose, **style.line_style(k)
-            )[0]
-            for k, (whose, one) in enumerate(labeled.items())
+    parts = {"amplitude": "m"}
+    if all("energy" in one for one in labeled.values()):
+        parts["energy"] = "J"
+    charts = []
+    for name, unit in parts.items():
+        curves = [
+            Curve(whose, one[name].values, one["frequency"].values)
+            for whose, one in labeled.items()
         ]
-    return style.finish(figure, keys if any(labeled) else [], 4, width=figure.get_figwidth())
+        charts.append(Chart(f"{name} ({unit})", "frequency (Hz)", curves, by_ratio=True))
+    size = 3.2 * len(charts) + 1.0, SIZE[1]
+    return figure_of(charts, size, title, len(charts), 4, sharey=True)
 
 
 def _size_along(backbone: xr.Dataset, curves: Mapping[str, xr.Dataset]) -> NDArray:

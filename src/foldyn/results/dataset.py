@@ -309,34 +309,6 @@ def random_dataset(
     return result_dataset(of, case, data, coordinates, statistics)
 
 
-def bands_dataset(
-    case: Case,
-    values: Mapping[str, ArrayLike],
-    gaps: Mapping[str, ArrayLike],
-    along: Mapping[str, Any],
-    statistics: Mapping[str, Any],
-) -> xr.Dataset:
-    """Dataset of the bands of a repeated case, including this case.
-
-    Parameters
-    ----------
-    case : Case
-        Case of one cell.
-    values : mapping of str to array_like
-        Variables of `quantities.BANDS`; their first dimension is the state if `along` has the
-        coordinate "state".
-    gaps : mapping of str to array_like
-        Variables of `quantities.GAPS`.
-    along : mapping
-        Coordinates of the dimensions state, phase, band and zone.
-    statistics : mapping
-        Facts about the computation, each stored as an attribute.
-    """
-    first = ("state",) if "state" in along else ()
-    data = variables(quantities.BANDS, first, values) | variables(quantities.GAPS, "gap", gaps)
-    return result_dataset("bands", case, data, along, statistics)
-
-
 def fidelity_dataset(
     case: Case,
     models: Sequence[str],

@@ -277,9 +277,11 @@ def sides(
     free = np.zeros(3 * count, bool)
     free[alone] = True
     free[stiff] = False
-    rotation, pieces, rotations = _without(
-        np.isin(mesh.panel, list(rigid)), rotation, pieces, turns + len(own)
-    )
+    kept = np.ones(turns + len(own) + 1, bool)  # the last entry stands for none
+    kept[rotation[np.repeat(np.isin(mesh.panel, list(rigid)), 3)]] = False
+    number = np.where(kept, np.cumsum(kept) - 1, -1)
+    number[-1] = -1
+    rotation, pieces = number[rotation], number[pieces]
     sign[rotation < 0] = 0.0
     return Sides(
         hinges=np.concatenate(hinges).astype(np.int64),
@@ -288,7 +290,7 @@ def sides(
         rotation=rotation.reshape(-1, 3),
         sign=sign.reshape(-1, 3),
         free=free.reshape(-1, 3),
-        rotations=rotations,
+        rotations=int(kept[:-1].sum()),
         piece_rotations=pieces,
         piece_ways=creased.ways,
         piece_crease=creased.crease,
@@ -362,17 +364,6 @@ def _after(own: Any, more: list[tuple[Any, ...]]) -> Any:
     """Rows of a named tuple of arrays, and more of them."""
     columns = zip(*more, strict=True) if more else (each[:0] for each in own)
     return type(own)(*map(np.concatenate, zip(own, map(np.array, columns), strict=True)))
-
-
-def _without(
-    rigid: NDArray, rotation: NDArray, pieces: NDArray, count: int
-) -> tuple[NDArray, NDArray, int]:
-    """Renumber rotations of sides (3 nt,) and creases (c, 2), without those of rigid triangles."""
-    kept = np.ones(count + 1, bool)  # the last entry stands for none
-    kept[rotation[np.repeat(rigid, 3)]] = False
-    number = np.where(kept, np.cumsum(kept) - 1, -1)
-    number[-1] = -1
-    return number[rotation], number[pieces], int(kept[:-1].sum())
 
 
 def _pieces(points: list[int]) -> list[Edge]:

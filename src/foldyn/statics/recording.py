@@ -225,8 +225,13 @@ def _dataset(
         warn(message, "statics.md#stability")
     if message := _asymmetry_warning(points[-1], problem):
         warn(message, "loads.md#pressure")
-    recorded = [_recorded(problem, point) for point in points]
-    residuals, energies, reactions, touches = zip(*recorded, strict=True)
+    residuals, energies, reactions, touches = [], [], [], []
+    for point in points:
+        problem.recall(point.memory)
+        residuals.append(problem.residual(point.u, point.factor))
+        energies.append(problem.energies(point.u, point.factor))
+        reactions.append(problem.reactions(point.u, point.factor))
+        touches.append(problem.touch(point.u, point.factor))
     begun = 0.0  # J, stored or dissipated from rest to the first point
     if from_rest:
         begun = float(energies[0].sum()) - problem.energy_at_rest
@@ -307,20 +312,6 @@ def _turn_warning(problem: OrigamiProblem, points: Sequence[Point], displacement
     if turns[at] <= TURN:
         return ""
     return far_turn(structure, turns[at], f"point {at} (load factor {points[at].factor:.6g})")
-
-
-def _recorded(
-    problem: OrigamiProblem, point: Point
-) -> tuple[NDArray, NDArray, NDArray, dict[str, NDArray]]:
-    """Residual (m,), energies, reactions and contact forces at a point, with its memory."""
-    problem.recall(point.memory)
-    at = point.u, point.factor
-    return (
-        problem.residual(*at),
-        problem.energies(*at),
-        problem.reactions(*at),
-        problem.touch(*at),
-    )
 
 
 def _memory(problem: OrigamiProblem, points: Sequence[Point], from_rest: bool) -> dict[str, Any]:

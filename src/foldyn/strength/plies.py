@@ -13,6 +13,8 @@ tension (t) and in compression (c), and in shear (S), a ply fails
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -53,24 +55,22 @@ def ply_factors(
         along = turned_strain(angle + np.radians(ply.angle))
         for z in (low, high):
             stress = np.einsum("ab,bcp,...pc->...pa", ply.fibers, along, strain + z * curvature)
-            own = (_tsai_wu if criterion == TSAI_WU else _maximum_stress)(stress, *ply.strength)
+            own = (_tsai_wu if criterion == TSAI_WU else _maximum_stress)(stress, ply.strength)
             least = np.minimum(least, own)
     return least
 
 
-def _maximum_stress(
-    stress: NDArray, xt: float, xc: float, yt: float, yc: float, shear: float
-) -> NDArray[np.float64]:
+def _maximum_stress(stress: NDArray, strength: Sequence[float]) -> NDArray[np.float64]:
+    xt, xc, yt, yc, shear = strength
     first, second, mixed = np.moveaxis(stress, -1, 0)
     used = [first / xt, -first / xc, second / yt, -second / yc, np.abs(mixed) / shear]
     with np.errstate(divide="ignore"):
         return 1.0 / np.max(used, axis=0)
 
 
-def _tsai_wu(
-    stress: NDArray, xt: float, xc: float, yt: float, yc: float, shear: float
-) -> NDArray[np.float64]:
+def _tsai_wu(stress: NDArray, strength: Sequence[float]) -> NDArray[np.float64]:
     """The positive root of a f^2 + b f = 1."""
+    xt, xc, yt, yc, shear = strength
     first, second, mixed = np.moveaxis(stress, -1, 0)
     a = first**2 / (xt * xc) + second**2 / (yt * yc) + (mixed / shear) ** 2
     a -= first * second / np.sqrt(xt * xc * yt * yc)

@@ -135,9 +135,7 @@ def _points(sweep: xr.Dataset) -> Iterator[Section]:
         values = one.transpose(POINT, ...).values.reshape(one.sizes[POINT], -1)
         several = values.shape[1] > 1
         for k in range(min(values.shape[1], MOST_COLUMNS)):
-            units = one.attrs.get("units", "1")
-            title = f"{name}{f' {k + 1}' if several else ''}"
-            columns[f"{title} ({units})" if units not in ("", "1") else title] = values[:, k]
+            columns[label(one, f"{name} {k + 1}" if several else name)] = values[:, k]
     count = table.sizes[POINT]
     rows = [
         [cell(value) if isinstance(value, float) else value for value in row]

@@ -116,11 +116,8 @@ def factors(values: NDArray, error: float) -> tuple[NDArray, NDArray, NDArray]:
 
 def _differences(values: NDArray, passes: int) -> NDArray:
     """Differences from sample to sample, with integer wrap-around like the page's sums."""
-    for _ in range(passes):
-        after = values.copy()
-        after[1:] -= values[:-1]
-        values = after
-    return values
+    before = np.zeros((passes, *values.shape[1:]), values.dtype)
+    return np.diff(values, passes, axis=0, prepend=before)
 
 
 def _deflated(values: NDArray) -> bytes:

@@ -101,7 +101,7 @@ class Scheme(ABC):
         Parameters of the scheme, for the result's attributes.
     """
 
-    symmetric: ClassVar[bool]
+    symmetric: bool
     tolerance: ClassVar[float]
     facts: Mapping[str, float] = {}
 
@@ -119,6 +119,8 @@ class Scheme(ABC):
         air = [isinstance(term, AirDragTerm) for term in packed.body.terms]
         damps = [term.damps for term in packed.body.terms] & ~np.array(air)
         self.damping, self.drag = np.flatnonzero(damps), np.flatnonzero(air)
+        self.rubbing = np.intersect1d(self.damping, self.driven)
+        self.symmetric = self.symmetric and all(term.symmetric for term in packed.body.terms)
         kept = (np.zeros(shape if len(own) else (0, 3)) for own in (self.damping, self.drag))
         rest = np.zeros(shape), np.zeros(histories), np.zeros_like(self.scratch.pushed), *kept
         self.old = StepEnd(state.u, state.v, state.carry, *rest)
@@ -301,16 +303,18 @@ class Scheme(ABC):
         """Arguments for `back`: the state in which `tangent` makes the matrix after `residual`."""
         own, memory = self, self.packed.body.find(HingeMemory)
         kept = () if memory is None else memory.snapshot()
-        arrays = (own.old.q, own.old.factor, own.shift, own.new.factor, own.state.angle)
+        start = (*own.old[:3], own.old.factor)
+        arrays = (*start, own.shift, own.new.factor, own.state.angle)
         return tuple(array.copy() for array in (*arrays, *kept))
 
     def back(self, h: float, origin: Sequence[NDArray]) -> None:
         """Return to the state where the matrix of a step h (s) was made; then call `resume`."""
-        q, factor, shift, ahead, angle, *kept = origin
+        q, w, a, factor, shift, ahead, angle, *kept = origin
         old, memory, s = self.old, self.packed.body.find(HingeMemory), self.scratch
         if memory is not None:
             memory.recall(kept)
         old.q[:], old.factor[:], self.shift[:], self.state.angle[:] = q, factor, shift, angle
+        old.w[:], old.a[:] = w, a  # for damping that depends on the velocity
         s.factor[:], s.time[0] = ahead, 0.0  # as if they had been evaluated at time 0
         self.residual(h, 0.0)
         s.time[0] = np.nan

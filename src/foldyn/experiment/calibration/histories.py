@@ -5,20 +5,22 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from foldyn.analyses.sections import one_of
+from foldyn.arguments import Check
 from foldyn.cases import Case
 from foldyn.cases.directions import AXES
 from foldyn.errors import InputError
 from foldyn.experiment.calibration.measurement import NodeValues, column
 from foldyn.experiment.camera import Sight
 from foldyn.signals import sampling_interval, spectrum
-from foldyn.values import choice, number, numbers, show
+from foldyn.values import number, numbers, show
 
 DETRENDS = (None, "constant", "linear")
 REFINED = 8  # number of Newton steps that refine the time shift; they converge quadratically
@@ -48,31 +50,26 @@ class TimeHistory(NodeValues):
         it. `Sight.of` takes a camera from tracks.
     """
 
-    time: Any = ()
-    axis: str = "x"
+    time: Annotated[Any, Check(column)] = ()
+    axis: Annotated[str, one_of(AXES)] = "x"
     delay: float = 0.0
-    align: float = 0.0
+    align: Annotated[float, Check(number, least=0.0)] = 0.0
     detrend: str | None = None
     sight: Sight | None = None
     kind: ClassVar[str] = "history"
     analysis: ClassVar[str] = "dynamics"
 
-    def __post_init__(self) -> None:
-        """Check the arguments."""
-        super().__post_init__()
-        choice(self._of("axis"), self.axis, AXES)
-        number(self._of("align"), self.align, least=0.0)
-        time = column(self._of("time"), self.time)
-        if len(time) < 2 or not (np.diff(time) > 0.0).all():
-            raise InputError(f"{self._of('time')}: must be at least two increasing times (s)")
-        values = self._per_node(np.array(self.values, dtype=np.float64), len(time), "times")
+    def agree(self) -> None:
+        """Check the values."""
+        super().agree()
+        if len(self.time) < 2 or not (np.diff(self.time) > 0.0).all():
+            raise InputError("time: must be at least two increasing times (s)")
+        values = self._per_node(np.array(self.values, dtype=np.float64), len(self.time), "times")
         if np.isinf(values).any():
-            raise InputError(f"{self._of('values')}: infinite; give NaN where a node was lost")
+            raise InputError("values: infinite; give NaN where a node was lost")
         if self.detrend not in DETRENDS:
-            raise InputError(
-                f'{self._of("detrend")} = {show(self.detrend)}: choose "constant", "linear" or none'
-            )
-        self._set(time=time, values=values)
+            raise InputError(f'detrend = {show(self.detrend)}: choose "constant", "linear" or none')
+        self._set(values=values)
         for node in range(values.shape[1]):
             self._refuse_constant(node)
 
@@ -81,7 +78,7 @@ class TimeHistory(NodeValues):
         seen = self.values[:, node][np.isfinite(self.values[:, node])]
         named = np.ravel(self.nodes)
         one = f"node {named[node]}" if len(named) == self.values.shape[1] else f"column {node}"
-        which = f"{self._of('values')}: {one}"
+        which = f"values: {one}"
         if seen.size < 2:
             raise InputError(f"{which} has {seen.size} values that are numbers; give at least two")
         if np.ptp(seen) == 0.0:
@@ -168,25 +165,21 @@ class Spectrum(NodeValues):
         As in `TimeHistory`.
     """
 
-    frequency: Any = ()
-    time: Any = ()
-    axis: str = "x"
+    frequency: Annotated[Any, Check(column)] = ()
+    time: Annotated[Any, Check(column)] = ()
+    axis: Annotated[str, one_of(AXES)] = "x"
     detrend: str | None = "constant"
     taper: str | None = None
     sight: Sight | None = None
     kind: ClassVar[str] = "spectrum"
     analysis: ClassVar[str] = "dynamics"
 
-    def __post_init__(self) -> None:
-        """Check the arguments."""
-        super().__post_init__()
-        choice(self._of("axis"), self.axis, AXES)
-        frequency = column(self._of("frequency"), self.frequency)
-        values = numbers(self._of("values"), self.values)
-        values = self._per_node(values, len(frequency), "frequencies")
-        time = column(self._of("time"), self.time)
-        sampling_interval(time)
-        self._set(frequency=frequency, values=values, time=time)
+    def agree(self) -> None:
+        """Check the values."""
+        super().agree()
+        sampling_interval(self.time)
+        values = numbers("values", self.values)
+        self._set(values=self._per_node(values, len(self.frequency), "frequencies"))
 
     @classmethod
     def of(

@@ -4,19 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from foldyn.analyses.sections import one_of
+from foldyn.arguments import Check
 from foldyn.cases import Case
 from foldyn.cases.directions import AXES, check_axes
 from foldyn.errors import InputError, within
 from foldyn.experiment.calibration.measurement import AtNodes, Measurement, NodeValues, column
 from foldyn.sweeps.measure import Asked, asked
 from foldyn.sweeps.measures import MEASURES
-from foldyn.values import choice, show
+from foldyn.values import show
 
 IMPOSED = "imposed"  # as `nodes`: all nodes that supports of the case move along the axis
 QUANTITIES = ("displacement", "position")
@@ -46,20 +48,18 @@ class ForceDisplacement(AtNodes):
     """
 
     nodes: Any = IMPOSED
-    displacement: Any = ()
+    displacement: Annotated[Any, Check(column)] = ()
     force: Any = ()
-    axis: str = "x"
+    axis: Annotated[str, one_of(AXES)] = "x"
     kind: ClassVar[str] = "force_displacement"
     analysis: ClassVar[str] = "statics"
     word: ClassVar[str] = IMPOSED
     unit: ClassVar[str] = "N"
 
-    def __post_init__(self) -> None:
-        """Check the arguments."""
-        super().__post_init__()
-        choice(self._of("axis"), self.axis, AXES)
-        moved = column(self._of("displacement"), self.displacement)
-        self._set(displacement=moved, force=column(self._of("force"), self.force, len(moved)))
+    def agree(self) -> None:
+        """Check the values."""
+        super().agree()
+        self._set(force=column("force", self.force, len(self.displacement)))
 
     def observed(self) -> NDArray[np.float64]:
         """Measured values, flattened."""
@@ -120,27 +120,24 @@ class Shapes(NodeValues):
     quantity : {"displacement", "position"}
     """
 
-    load_factor: Any = ()
-    axes: str = "xyz"
-    quantity: str = "displacement"
+    load_factor: Annotated[Any, Check(column)] = ()
+    axes: Annotated[str, Check(check_axes)] = "xyz"
+    quantity: Annotated[str, one_of(QUANTITIES)] = "displacement"
     kind: ClassVar[str] = "shapes"
     analysis: ClassVar[str] = "statics"
 
-    def __post_init__(self) -> None:
-        """Check the arguments."""
-        super().__post_init__()
-        choice(self._of("quantity"), self.quantity, QUANTITIES)
-        check_axes(self._of("axes"), self.axes)
-        factors = column(self._of("load_factor"), self.load_factor)
+    def agree(self) -> None:
+        """Check the values."""
+        super().agree()
         values = np.array(self.values, dtype=np.float64)
-        if values.ndim != 3 or values.shape[::2] != (len(factors), len(self.axes)):
+        if values.ndim != 3 or values.shape[::2] != (len(self.load_factor), len(self.axes)):
             raise InputError(
-                f"{self._of('values')}: shape {values.shape}: must be (steps, nodes, axes), here "
-                f"({len(factors)}, nodes, {len(self.axes)})"
+                f"values: shape {values.shape}: must be (steps, nodes, axes), here "
+                f"({len(self.load_factor)}, nodes, {len(self.axes)})"
             )
         if not np.isfinite(values).any() or np.isinf(values).any():
-            raise InputError(f"{self._of('values')}: must be numbers, NaN where a node is not seen")
-        self._set(load_factor=factors, values=values)
+            raise InputError("values: must be numbers, NaN where a node is not seen")
+        self._set(values=values)
 
     def factors(self, case: Case) -> NDArray[np.float64]:
         """Load factors at which the path is needed."""
@@ -171,23 +168,22 @@ class Measured(Measurement):
     """
 
     measure: str = ""
-    load_factor: Any = ()
+    load_factor: Annotated[Any, Check(column)] = ()
     values: Any = ()
     kind: ClassVar[str] = "measure"
     analysis: ClassVar[str] = "statics"
 
-    def __post_init__(self) -> None:
-        """Check the arguments."""
-        super().__post_init__()
-        with within(self._of("measure")):
+    def agree(self) -> None:
+        """Check the values."""
+        super().agree()
+        with within("measure"):
             found = asked(self.measure, MEASURES)
         if found.measure.name not in OF_STATES:
             raise InputError(
                 f" = {show(self.measure)}: a fit compares states, by {', '.join(OF_STATES)}",
-                self._of("measure"),
+                "measure",
             )
-        factors = column(self._of("load_factor"), self.load_factor)
-        self._set(load_factor=factors, values=column(self._of("values"), self.values, len(factors)))
+        self._set(values=column("values", self.values, len(self.load_factor)))
 
     @property
     def asked(self) -> Asked:

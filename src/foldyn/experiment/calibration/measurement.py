@@ -6,21 +6,28 @@ from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
 from foldyn.analyses.keys import parts
+from foldyn.arguments import Check, Checked
 from foldyn.cases import Case
 from foldyn.cases.selection import check_nodes, resolve_nodes
 from foldyn.errors import InputError
 from foldyn.values import number, numbers
 
 
+def _keys(name: str, changes: Mapping[str, Any]) -> Mapping[str, Any]:
+    for key in changes:
+        parts(key)
+    return changes
+
+
 @dataclass(frozen=True, eq=False, kw_only=True)
-class Measurement(ABC):
+class Measurement(Checked, ABC):
     """Measured values, and the model's predictions of them.
 
     Parameters
@@ -46,7 +53,7 @@ class Measurement(ABC):
     sigma: Any = None
     held_out: bool = False
     case: str | Path | None = None
-    changes: Mapping[str, Any] = field(default_factory=dict)
+    changes: Annotated[Mapping[str, Any], Check(_keys)] = field(default_factory=dict)
     kind: ClassVar[str] = ""
     analysis: ClassVar[str] = ""
     each: ClassVar[bool] = False  # whether sigma may be a list
@@ -56,21 +63,24 @@ class Measurement(ABC):
     absorbed: ClassVar[int] = 0
 
     def __post_init__(self) -> None:
-        """Check the common fields."""
+        """Check the arguments, under the name of the measurement."""
         self._set(name=self.name or self.kind)
+        super().__post_init__()
+
+    @property
+    def place(self) -> str:  # type: ignore[override]
+        """Prefix of arguments in messages."""
+        return f"{self.name}: "
+
+    def agree(self) -> None:
+        """Check the standard error, and in each kind its values."""
         listed = self.each and isinstance(self.sigma, Sequence | np.ndarray)
         if self.sigma is not None and not listed:
-            number(self._of("sigma"), self.sigma, above=0.0)
-        for key in self.changes:
-            parts(key)
-
-    def _set(self, **values: Any) -> None:
-        for name, value in values.items():
-            object.__setattr__(self, name, value)
+            number("sigma", self.sigma, above=0.0)
 
     def _of(self, name: str) -> str:
         """Name of a field in messages."""
-        return f"{self.name or self.kind}: {name}"
+        return f"{self.place}{name}"
 
     @abstractmethod
     def observed(self) -> NDArray[np.float64]:
@@ -91,7 +101,7 @@ class Measurement(ABC):
     def predicted(self, result: xr.Dataset, case: Case) -> NDArray[np.float64]:
         """Predictions of the measured values by a result, flattened in the same order."""
 
-    def examine(self, result: xr.Dataset, case: Case) -> None:  # noqa: B027
+    def examine(self, result: xr.Dataset, case: Case) -> None:
         """Refuse a result in which the measured modes cannot be identified."""
 
     def factors(self, case: Case) -> NDArray[np.float64]:
@@ -112,11 +122,11 @@ class AtNodes(Measurement):
     nodes: int | str | Sequence[int] = ()
     word: ClassVar[str] = ""  # text that `nodes` may be in this kind only
 
-    def __post_init__(self) -> None:
+    def agree(self) -> None:
         """Check the nodes."""
-        super().__post_init__()
+        super().agree()
         if not (isinstance(self.nodes, str) and self.nodes == self.word):
-            self._set(nodes=check_nodes(self._of("nodes"), self.nodes))
+            self._set(nodes=check_nodes("nodes", self.nodes))
 
     def where(self, case: Case) -> NDArray[np.int64]:
         """Numbers of the nodes."""
@@ -151,13 +161,12 @@ class NodeValues(AtNodes):
         if named != known:
             raise InputError(f"{self._of('values')}: has {known} nodes, but {named} are named")
 
-    def _per_node(self, values: NDArray, rows: int, what: str, field: str = "values") -> NDArray:
+    @staticmethod
+    def _per_node(values: NDArray, rows: int, what: str, field: str = "values") -> NDArray:
         """Values for a number of rows, a column for each node."""
         values = values[:, None] if values.ndim == 1 else values
         if values.ndim != 2 or len(values) != rows:
-            raise InputError(
-                f"{self._of(field)}: shape {values.shape}: must be ({rows} {what}, nodes)"
-            )
+            raise InputError(f": shape {values.shape}: must be ({rows} {what}, nodes)", field)
         return values
 
 

@@ -5,12 +5,14 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, ClassVar, NamedTuple
+from typing import Annotated, Any, ClassVar, NamedTuple
 
 import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from foldyn.analyses.sections import one_of
+from foldyn.arguments import Check
 from foldyn.cases import BaseMotion, Case
 from foldyn.cases.directions import AXES, check_axes
 from foldyn.errors import ComputationError, InputError
@@ -18,7 +20,7 @@ from foldyn.experiment.calibration.measurement import Measurement, NodeValues, c
 from foldyn.linear import convert, mac, pair_modes
 from foldyn.linear.frf import METHODS
 from foldyn.results.quantities import RESPONSES
-from foldyn.values import choice, numbers, show
+from foldyn.values import numbers, show
 
 LEAST = 0.5  # smallest MAC between a measured mode and its partner in the model
 CLOSE = 0.1  # a partner is unique if its MAC exceeds that of every other mode by this
@@ -57,32 +59,31 @@ class ModeShapes(NodeValues):
         Standard error of a component, relative to the largest component of its mode.
     """
 
-    axes: str = "xyz"
+    axes: Annotated[str, Check(check_axes)] = "xyz"
     mode: Any = None
     kind: ClassVar[str] = "mode_shapes"
     analysis: ClassVar[str] = "modes"
     unit: ClassVar[str] = ""
     adapts: ClassVar[bool] = True  # shapes are paired and scaled
 
-    def __post_init__(self) -> None:
-        """Check the arguments."""
-        super().__post_init__()
-        check_axes(self._of("axes"), self.axes)
-        values = plain_array(self._of("values"), self.values)
+    def agree(self) -> None:
+        """Check the values."""
+        super().agree()
+        values = plain_array("values", self.values)
         if values.ndim != 3 or values.shape[2] != len(self.axes) or values.dtype.kind not in "fiu":
             raise InputError(
-                f"{self._of('values')}: shape {values.shape}, {values.dtype}: must be real numbers "
+                f"values: shape {values.shape}, {values.dtype}: must be real numbers "
                 f"(modes, nodes, axes), here (modes, nodes, {len(self.axes)})"
             )
         values = values.astype(np.float64)
         if np.isinf(values).any():
-            raise InputError(f"{self._of('values')}: infinite; give NaN where nothing was measured")
-        self._set(mode=_numbered(self._of("mode"), self.mode, len(values)))
+            raise InputError("values: infinite; give NaN where nothing was measured")
+        self._set(mode=_numbered("mode", self.mode, len(values)))
         for number, one in zip(self.mode, values, strict=True):
             known = one[np.isfinite(one)]
             if len(known) < FEWEST or not known.any():
                 raise InputError(
-                    f"{self._of('values')}: mode {number} has {len(known)} components that are "
+                    f"values: mode {number} has {len(known)} components that are "
                     f"numbers; a shape needs at least {FEWEST}, not all of them 0"
                 )
         self._set(values=values / np.nanmax(np.abs(values), axis=(1, 2))[:, None, None])
@@ -189,29 +190,29 @@ class ModalParameters(Measurement):
     each: ClassVar[bool] = True
     quantity: ClassVar[str]  # variable of modes to compare, and the field of its measured values
 
-    def __post_init__(self) -> None:
-        """Check the arguments."""
-        super().__post_init__()
-        values = column(self._of(self.quantity), getattr(self, self.quantity))
+    def agree(self) -> None:
+        """Check the values."""
+        super().agree()
+        values = column(self.quantity, getattr(self, self.quantity))
         self._check_values(values)
         self._set(**{self.quantity: values, "mode": self._modes(len(values))})
         if isinstance(self.sigma, np.ndarray | list | tuple):
-            sigma = column(self._of("sigma"), self.sigma, len(values))
+            sigma = column("sigma", self.sigma, len(values))
             if (sigma <= 0.0).any():
-                raise InputError(f"{self._of('sigma')}: must be greater than 0 for each mode")
+                raise InputError("sigma: must be greater than 0 for each mode")
             self._set(sigma=sigma)
 
     def _modes(self, count: int) -> NDArray[np.int64]:
-        numbered = _numbered(self._of("mode"), self.mode, count)
+        numbered = _numbered("mode", self.mode, count)
         if self.shapes is None:
             return numbered
         if not isinstance(self.shapes, ModeShapes):
-            raise InputError(f"{self._of('shapes')}: got {show(self.shapes)}, give ModeShapes")
+            raise InputError(f"shapes: got {show(self.shapes)}, give ModeShapes")
         if self.mode is None and len(self.shapes.mode) == count:
             return self.shapes.mode
         if not np.array_equal(self.shapes.mode, numbered):
             raise InputError(
-                f"{self._of('shapes')}: has the modes {show(self.shapes.mode.tolist())}, but there "
+                f"shapes: has the modes {show(self.shapes.mode.tolist())}, but there "
                 f"are values of {show(numbered.tolist())}; give both for the same modes"
             )
         return numbered
@@ -276,13 +277,12 @@ class NaturalFrequencies(ModalParameters):
     def _check_values(self, values: NDArray[np.float64]) -> None:
         if (values <= 0.0).any():
             raise InputError(
-                f"{self._of('frequency')} = {values.min():g}: must be greater than 0 Hz; leave out "
-                "rigid motions"
+                f"frequency = {values.min():g}: must be greater than 0 Hz; leave out rigid motions"
             )
         back = np.flatnonzero(np.diff(values) < 0.0)
         if back.size:
             raise InputError(
-                f"{self._of('frequency')}: {values[back[0] + 1]:g} Hz comes after "
+                f"frequency: {values[back[0] + 1]:g} Hz comes after "
                 f"{values[back[0]]:g} Hz; sort the modes by frequency"
             )
 
@@ -306,8 +306,7 @@ class DampingRatios(ModalParameters):
         wrong = values[(values < 0.0) | (values >= 1.0)]
         if wrong.size:
             raise InputError(
-                f"{self._of('damping_ratio')} = {wrong[0]:g}: must be from 0 to below 1 (2 % is "
-                "0.02)"
+                f"damping_ratio = {wrong[0]:g}: must be from 0 to below 1 (2 % is 0.02)"
             )
 
 
@@ -367,45 +366,42 @@ class FrequencyResponse(NodeValues):
         Standard error of a real or an imaginary part, or of a magnitude.
     """
 
-    frequency: Any = ()
-    axis: str = "x"
-    quantity: str = "receptance"
+    frequency: Annotated[Any, Check(column)] = ()
+    axis: Annotated[str, one_of(AXES)] = "x"
+    quantity: Annotated[str, one_of(RESPONSES)] = "receptance"
     magnitude: bool = False
     kind: ClassVar[str] = "frf"
     analysis: ClassVar[str] = "frf"
     each: ClassVar[bool] = True
 
-    def __post_init__(self) -> None:
-        """Check the arguments."""
-        super().__post_init__()
-        choice(self._of("axis"), self.axis, AXES)
-        choice(self._of("quantity"), self.quantity, RESPONSES)
-        frequency = column(self._of("frequency"), self.frequency)
+    def agree(self) -> None:
+        """Check the values."""
+        super().agree()
+        frequency = self.frequency
         if frequency[0] < 0.0 or (np.diff(frequency) <= 0.0).any():
-            raise InputError(f"{self._of('frequency')}: must increase from 0 Hz or more; sort it")
-        values = plain_array(self._of("values"), self.values)
+            raise InputError("frequency: must increase from 0 Hz or more; sort it")
+        values = plain_array("values", self.values)
         if values.dtype.kind not in ("fiu" if self.magnitude else "c"):
             what = "magnitudes are real numbers" if self.magnitude else "must be complex numbers"
             other = "leave out magnitude" if self.magnitude else "for magnitudes: magnitude = true"
-            raise InputError(f"{self._of('values')}: got {values.dtype}: {what} ({other})")
+            raise InputError(f"values: got {values.dtype}: {what} ({other})")
         values = values.astype(np.float64 if self.magnitude else np.complex128)
         values = self._per_node(values, len(frequency), "frequencies")
         if not np.isfinite(values).any() or np.isinf(values).any():
-            raise InputError(f"{self._of('values')}: must be numbers, NaN where none was measured")
+            raise InputError("values: must be numbers, NaN where none was measured")
         if self.magnitude and (values < 0.0).any():
-            raise InputError(f"{self._of('values')}: a magnitude cannot be negative")
-        self._set(frequency=frequency, values=values)
+            raise InputError("values: a magnitude cannot be negative")
+        self._set(values=values)
         if isinstance(self.sigma, np.ndarray | list | tuple):
             self._set(sigma=self._errors_of_lines())
 
     def _errors_of_lines(self) -> NDArray[np.float64]:
-        sigma = plain_array(self._of("sigma"), self.sigma)
+        sigma = plain_array("sigma", self.sigma)
         sigma = self._per_node(sigma, len(self.frequency), "frequencies", "sigma")
         sound = sigma.dtype.kind in "fiu" and sigma.shape == self.values.shape
         if not sound or not (sigma[np.isfinite(self.values)] > 0.0).all():
             raise InputError(
-                f"{self._of('sigma')}: must be a number greater than 0 for each of the "
-                f"{self.values.shape} values"
+                f"sigma: must be a number greater than 0 for each of the {self.values.shape} values"
             )
         return sigma.astype(np.float64)
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from foldyn.analyses.keys import Tie, number_keys, parts, value_at
 from foldyn.arguments import brief
 from foldyn.errors import InputError
-from foldyn.values import number, show, suggest, whole
+from foldyn.values import number, of_kind, show, suggest, whole
 
 NEAR = 1e-4  # change of a scaled parameter between neighboring solutions, for differences
 FIRST = ((0, -1.0), (1, 1.0)), ((0, 1.0), (-1, -1.0))
@@ -176,8 +176,7 @@ def space(
     if not parameters:
         raise InputError("parameters: none; name at least one key of the case file")
     for i, parameter in enumerate(parameters):
-        if not isinstance(parameter, Parameter):
-            raise InputError(f"parameters[{i}]: got {show(parameter)}, give a Parameter")
+        of_kind(f"parameters[{i}]", parameter, Parameter)
     tied = tuple(Tie(key, text) for key, text in ties.items())
     keys = [one.key for one in (*parameters, *tied)]
     for key in keys:

@@ -13,22 +13,9 @@ _MARGIN = 3  # pixels around a triangle's box, because distortion bends its edge
 
 @strict
 def draw(
-    slopes: Any,
-    nearness: Any,
-    pixels: Any,
-    triangles: Any,
-    flat: Any,
-    marked: Any,
-    dark: Any,
-    shade: Any,
-    grain: Any,
-    look: Any,
-    lens: Any,
-    shift: Any,
-    box: Any,
-    depth: Any,
-    bright: Any,
-) -> None:
+    slopes, nearness, pixels, triangles, flat, marked, dark, shade, grain, look, lens, shift, box,
+    depth, bright,
+):  # fmt: skip
     """Draw triangles over the content of `bright`, with the nearest in front.
 
     Parameters

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from foldyn import plots
 from foldyn.analyses.provenance import Call, computed, inputs, inputs_table
 from foldyn.cases import Force
-from foldyn.plots import style
+from foldyn.plots.chart_figures import figure_of
+from foldyn.plots.charts import Chart, Curve
 from foldyn.report import Heading, Listing, Section, Table, Text, write_report
 from foldyn.report.album import Album
 from foldyn.report.sections import cell
@@ -228,19 +229,15 @@ def _plot_statics(
     paths: Mapping[str, xarray.Dataset], nodes: Sequence[int], axis: str, force: float
 ) -> Figure:
     """Draw the force (N at factor 1) on each loaded node against displacement, a frame each."""
-    figure = style.new_figure(9.0, 3.4)
-    frames = figure.subplots(1, len(nodes), squeeze=False, sharey=True)[0]
-    for frame, node in zip(frames, nodes, strict=True):
-        force_label = "force on each loaded node (N)" if node == nodes[0] else ""
-        style.frame(frame, f"{axis} displacement (m)", force_label, f"node {node}")
-        for index, (name, path) in enumerate(paths.items()):
+    labels = f"{axis} displacement (m)", "force on each loaded node (N)"
+    charts = []
+    for node in nodes:
+        curves = []
+        for name, path in paths.items():
             moved = path["displacement"].sel(node=node, axis=axis).values
-            look = style.line_style(index) | {"linewidth": 1.5, "label": name}
-            frame.plot(moved, force * path["load_factor"].values, **look)
-        frame.locator_params(axis="x", nbins=5)
-        style.exponents(frame, ticks=6)
-    style.legend_below(figure, frames[0].get_lines(), columns=3)
-    return style.finish(figure)
+            curves.append(Curve(name, moved, force * path["load_factor"].values))
+        charts.append(Chart(*labels, curves, f"node {node}"))
+    return figure_of(charts, (9.0, 3.4), columns=len(nodes), sharey=True)
 
 
 def _errors(study: Study, case: str, nodes: list[int]) -> Table:

@@ -9,13 +9,14 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from foldyn import plots
 from foldyn.linear import character
 from foldyn.plots import style
+from foldyn.plots.chart_figures import figure_of
+from foldyn.plots.charts import Chart, Curve
 from foldyn.report import Heading, Picture, Section, Table, Text
 from foldyn.report.album import Album
 from foldyn.report.sections import cell
@@ -29,6 +30,7 @@ from foldyn.studies.herkal.specimen.tasks import Part
 from foldyn.studies.herkal.targets import Target, read_targets
 
 WIDTH = 9.0  # inches
+HIGHEST = 25.0  # Hz, end of the spectra shown
 ORDINALS = ("first", "second", "third")
 COLUMNS = 3  # number of front nodes in a row of the pattern
 SUPPORT_NAMES = {
@@ -53,52 +55,36 @@ def plot_front(
         there, said = (evaluation.content(x, sampling_interval(along)) for x in (film, model))
         if there is not None and said is not None:
             curves[node] = *there, said[1]
-    rows = -(-len(curves) // COLUMNS)
-    figure = style.new_figure(WIDTH, 0.8 + 1.15 * rows, note)
-    frames = figure.subplots(rows, COLUMNS, squeeze=False, sharex=True, sharey="row").ravel()
-    lines = []
-    for k, (frame, (node, (along, film, model))) in enumerate(
-        zip(frames, curves.items(), strict=False)
-    ):
-        below = "frequency (Hz)" if spectra else "time (s)"
-        beside = "x (mm)" if k % COLUMNS == 0 else ""
-        style.frame(frame, below if k >= len(curves) - COLUMNS else "", beside, f"node {node}")
-        mark = {"marker": ".", "markersize": 2.5, "linestyle": "none", "label": label}
-        lines = frame.plot(along, 1e3 * film, color=style.VERMILLION, **mark)
-        lines += frame.plot(along, 1e3 * model, color=style.BLUE, linewidth=1.0, label="model")
-        frame.margins(x=0.01)
-        frame.locator_params(axis="y", nbins=4)
-    for frame in frames[len(curves) :]:
-        frame.set_visible(False)
-    style.legend_below(figure, lines, columns=2)
-    return style.finish(figure)
+    labels = "frequency (Hz)" if spectra else "time (s)", "x (mm)"
+    charts = []
+    for node, (along, film, model) in curves.items():
+        both = Curve("model", along, 1e3 * model), Curve(label, along, 1e3 * film, dots=True)
+        charts.append(Chart(*labels, both, f"node {node}"))
+    size = WIDTH, 0.8 + 1.15 * -(-len(charts) // COLUMNS)
+    return figure_of(charts, size, note, COLUMNS, sharex=True, sharey="row")
 
 
 def plot_supports(front: xr.Dataset, label: str, note: str) -> Figure:
     """Draw motion and spectrum of the watched node in the film and with each support."""
-    figure = style.new_figure(WIDTH, 3.6, note)
-    left, right = figure.subplots(1, 2)
-    style.frame(left, "time (s)", "x displacement (mm)", f"node {WATCHED}")
-    style.frame(right, "frequency (Hz)", "x amplitude (mm)")
-    time, step = front["time"].values, sampling_interval(front["time"].values)
-    look = {"color": style.BLACK, "marker": ".", "markersize": 3.5, "linestyle": "none"}
-    handles = left.plot(time, 1e3 * front["measured"].sel(node=WATCHED).values, **look, label=label)
-    _plot_content(right, front["whole"].sel(node=WATCHED).values, step, look)
-    for k, (support, name) in enumerate(SUPPORT_NAMES.items()):
-        x = front["model"].sel(node=WATCHED, support=support).values
-        curve = style.line_style(k) | {"linewidth": 1.4}
-        handles += left.plot(time, 1e3 * x, **curve, label=f"model: {name}")
-        _plot_content(right, x, step, curve)
-    right.set_xlim(0.0, 25.0)
-    left.margins(x=0.01)
-    style.legend_below(figure, handles, columns=4)
-    return style.finish(figure)
+    one, time = front.sel(node=WATCHED), front["time"].values
+    motions, spectra = [], []
 
+    def add(name: str, moved: NDArray, whole: NDArray, dots: bool = False) -> None:
+        motions.append(Curve(name, time, 1e3 * moved, dots))
+        found = evaluation.content(whole, sampling_interval(time))
+        if found is not None:
+            shown = found[0] <= HIGHEST
+            spectra.append(Curve(name, found[0][shown], 1e3 * found[1][shown], dots))
 
-def _plot_content(axes: Axes, x: NDArray[np.float64], step: float, look: Mapping) -> None:
-    found = evaluation.content(x, step)
-    if found is not None:
-        axes.plot(found[0], 1e3 * found[1], **look)
+    for support, name in SUPPORT_NAMES.items():
+        model = one["model"].sel(support=support).values
+        add(f"model: {name}", model, model)
+    add(label, one["measured"].values, one["whole"].values, dots=True)
+    charts = [
+        Chart("time (s)", "x displacement (mm)", motions, f"node {WATCHED}"),
+        Chart("frequency (Hz)", "x amplitude (mm)", spectra),
+    ]
+    return figure_of(charts, (WIDTH, 3.6), note, 2, 4)
 
 
 def plot_responses(
