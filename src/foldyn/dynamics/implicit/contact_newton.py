@@ -22,7 +22,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
 from foldyn.algebra.superlu import SingularTangentError
 from foldyn.dynamics.implicit.matrix import StepMatrix
@@ -115,7 +114,8 @@ class TouchingNewton(Newton):
             if verdict in (SOLVED, NOT_FINITE):
                 return verdict
             scheme.tangent(matrix, before, again)
-            matrix.added = self._tangent()
+            touching = scheme.contact_tangent(self._contact, self.memory)
+            matrix.added = touching if touching.nnz else None
             try:
                 matrix.factorize(scheme.weights(h))
             except SingularTangentError:
@@ -145,11 +145,6 @@ class TouchingNewton(Newton):
     def _residual(self, h: float, t: float) -> tuple[float, float]:
         self.evaluations += 1
         return self.scheme.residual(h, t)
-
-    def _tangent(self) -> sparse.csr_array | None:
-        """Contact tangent at the last force evaluation; None if nothing touches."""
-        tangent = self.scheme.contact_tangent(self._contact, self.memory)
-        return tangent if tangent.nnz else None
 
     def _along(self, h: float, t: float, step: NDArray) -> tuple[float, float]:
         """Move along a step (rows, 3) as far as the line search allows; return residual norms."""
