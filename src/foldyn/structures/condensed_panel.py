@@ -34,7 +34,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.linalg import null_space
+from scipy.linalg import block_diag, null_space
 from scipy.sparse.linalg import splu
 
 from foldyn.algebra.condensing import Condensing
@@ -92,10 +92,7 @@ def least_heights(panel: Outline, size: int) -> NDArray:
     """Matrix (size, q) from angles to the least heights with the spoke turns, and other angles."""
     points, corners = _points(panel), len(panel.corners)
     spokes = spoke_turns(points, corners) if panel.center else np.zeros((0, len(points)))
-    out = np.zeros((size, len(spokes) + size - len(points)))
-    out[: len(points), : len(spokes)] = np.linalg.pinv(spokes, rcond=1e-9)
-    out[len(points) :, len(spokes) :] = np.eye(size - len(points))
-    return out
+    return block_diag(np.linalg.pinv(spokes, rcond=1e-9), np.eye(size - len(points)))
 
 
 def heights_and_slopes(panel: Outline) -> NDArray:
