@@ -86,7 +86,6 @@ def _lock(opened: int) -> None:
 
 
 def _is(path: Path, opened: int) -> bool:
-    try:
+    with suppress(FileNotFoundError):
         return os.path.samestat(os.stat(path), os.fstat(opened))
-    except FileNotFoundError:
-        return False
+    return False

@@ -10,7 +10,7 @@ import math
 import os
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from contextvars import ContextVar
 from pathlib import Path
 
@@ -86,15 +86,13 @@ def check_memory(field: str, what: str, needed: float, remedy: str) -> None:
 
 
 def _machine() -> float:
-    try:
+    with suppress(AttributeError, OSError, ValueError):
         return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
-    except (AttributeError, OSError, ValueError):
-        return math.inf
+    return math.inf
 
 
 def _limit(file: str) -> float:
     """Limit of a container, in bytes."""
-    try:
+    with suppress(OSError, ValueError):  # the file does not exist, or contains "max"
         return float(Path(file).read_text())
-    except (OSError, ValueError):  # the file does not exist, or contains "max"
-        return math.inf
+    return math.inf

@@ -105,7 +105,7 @@ class Workers(Generic[Item, Result]):
         left, doubtful = iter(items), deque[Item]()
         for item in islice(left, int(first)):
             for _ in range(self.count):
-                self._submit(_nothing)
+                self._submit(int)  # starts a process
             keep(item, self.do(item))
         while True:
             broken = self._each(left, keep)
@@ -187,10 +187,6 @@ _own: list[Callable[[Any], Any]] = []  # the function of a worker process
 
 def _do(item: Any) -> Any:
     return _own[0](item)
-
-
-def _nothing() -> None:
-    pass
 
 
 def _live(line: Connection, share: float, do: bytes) -> None:

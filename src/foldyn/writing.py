@@ -88,7 +88,7 @@ def scratch(folder: Path, name: str) -> Iterator[Path]:
         shutil.rmtree(made, ignore_errors=True)
 
 
-def made_folder(folder: str | os.PathLike[str], field: str = "folder") -> Path:
+def made_folder(folder: str | os.PathLike[str]) -> Path:
     """A folder to write into: created if missing, and cleared of partial files.
 
     Raises
@@ -101,7 +101,7 @@ def made_folder(folder: str | os.PathLike[str], field: str = "folder") -> Path:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         why = "is a file" if path.is_file() else f"cannot be made ({error.strerror})"
-        raise InputError(f" = {str(path)!r}: {why}; give the path of a folder", field) from error
+        raise InputError(f" = {str(path)!r}: {why}; give the path of a folder", "folder") from error
     remove_leftovers(path)
     return path
 

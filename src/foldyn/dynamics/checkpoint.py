@@ -172,11 +172,10 @@ class Keeping:
         if kept is None:
             return None
         if not self.resume:
-            on, anew = self.how
             raise InputError(
                 f"{self.folder}: keeps an interrupted motion, up to "
-                f"t = {kept[_ABOUT]['reached']:.6g} s: continue it by {on}, or {anew} to start "
-                "again"
+                f"t = {kept[_ABOUT]['reached']:.6g} s: continue it by {self.how[0]}, or "
+                f"{self.how[1]} to start again"
             )
         told = kept.pop(_ABOUT)
         self._compare(told["motion"])
@@ -428,7 +427,7 @@ def restore(parts: Mapping[str, Any], kept: Mapping[str, NDArray]) -> None:
     KeyError, ValueError
         The snapshot belongs to other parts.
     """
-    for name, owner, field, value in list(_places(parts)):
+    for name, owner, field, value in _places(parts):
         then = kept[name]
         if isinstance(value, np.void):
             for one, number in zip(value.dtype.names or (), then.tolist(), strict=True):
@@ -441,15 +440,13 @@ def restore(parts: Mapping[str, Any], kept: Mapping[str, NDArray]) -> None:
             setattr(owner, field, type(value)(then[()]))
 
 
-def _places(parts: Mapping[str, Any]) -> Iterator[_Place]:
+def _places(parts: Mapping[str, Any]) -> list[_Place]:
     """Mutable places in parts; an array shared by several threads appears once."""
-    seen: set[int] = set()
+    seen: dict[Any, _Place] = {}
     for place in _all_places(parts):
-        if isinstance(place.value, np.ndarray):
-            if id(place.value) in seen:
-                continue
-            seen.add(id(place.value))
-        yield place
+        shared = isinstance(place.value, np.ndarray)
+        seen.setdefault(id(place.value) if shared else place.name, place)
+    return list(seen.values())
 
 
 def _all_places(parts: Mapping[str, Any]) -> Iterator[_Place]:

@@ -19,6 +19,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy import sparse
+from scipy.linalg import eigh
 from scipy.sparse import linalg
 
 from foldyn.algebra.superlu import SingularTangentError, factorize
@@ -108,7 +109,7 @@ def largest_frequency(case: Case, u: ArrayLike | None = None) -> float:
     and dofs without mass with the inertia that explicit methods give them.
     """
     case = explicit(of_kind("case", case, Case))
-    return float(np.sqrt(max(_largest_quotient(case, _tangent(case, u)), 0.0)))
+    return float(np.sqrt(max(_quotient_of(case, _tangent(case, u), *_moving(case)), 0.0)))
 
 
 def explicit(case: Case) -> Case:
@@ -176,7 +177,8 @@ def damper_rate(case: Case, u: ArrayLike | None = None) -> float:
     """Largest damping rate (1/s) of dashpots, creases and strain damping about u (n, 3)."""
     if not dampers(case):
         return 0.0
-    return _largest_quotient(case, damping_matrix(case, case.body.dofs(_state(case, u)), most=True))
+    damping = damping_matrix(case, case.body.dofs(_state(case, u)), most=True)
+    return _quotient_of(case, damping, *_moving(case))
 
 
 def _tangent(case: Case, u: ArrayLike | None) -> sparse.csr_array:
@@ -190,11 +192,6 @@ def _tangent(case: Case, u: ArrayLike | None) -> sparse.csr_array:
 
 def _state(case: Case, u: ArrayLike | None) -> NDArray:
     return np.zeros_like(case.structure.nodes) if u is None else np.asarray(u, float)
-
-
-def _largest_quotient(case: Case, matrix: sparse.csr_array) -> float:
-    """Largest eigenvalue, relative to the mass, of a matrix (m, m) on all dofs that move."""
-    return _quotient_of(case, matrix, *_moving(case))
 
 
 def _moving(case: Case) -> tuple[NDArray, sparse.csr_array]:
@@ -223,7 +220,7 @@ def _quotient_of(
 
 def _largest_eigenvalue(k: sparse.csr_array, m: sparse.csr_array) -> float:
     if k.shape[0] <= _DENSE:
-        values = _dense(k.toarray(), m.toarray())
+        values = eigh(k.toarray(), m.toarray(), eigvals_only=True)[-1]
     elif is_lumped(m):
         root = sparse.diags_array(1.0 / np.sqrt(m.diagonal()))
         values = _largest(sparse.csr_array(root @ k @ root))
@@ -231,11 +228,6 @@ def _largest_eigenvalue(k: sparse.csr_array, m: sparse.csr_array) -> float:
         solve = factorize(sparse.csc_array(m), symmetric=False).solve
         values = _largest(k, m, linalg.LinearOperator(m.shape, matvec=solve, dtype=float))
     return float(values)
-
-
-def _dense(k: NDArray, m: NDArray) -> float:
-    root = np.linalg.inv(np.linalg.cholesky(m))
-    return float(np.linalg.eigvalsh(root @ k @ root.T)[-1])
 
 
 def _largest(

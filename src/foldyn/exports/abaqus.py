@@ -97,10 +97,8 @@ def _panels(shell: CreasedShell, kind: str) -> Iterator[str]:
         for k, both in enumerate(ways):
             name, some = _name(number, k + 1 if sheet.orthotropic else 0), own[way.ravel() == k]
             yield f"*ELEMENT, TYPE={kind}, ELSET=PANELS_{name}"
-            for element, nodes in zip(
-                (some + 1).tolist(), (shell.triangles[some] + 1).tolist(), strict=True
-            ):
-                yield line(element, *nodes)
+            for row in (np.column_stack([some, shell.triangles[some]]) + 1).tolist():
+                yield line(*row)
             yield from _section(sheet, number, name, both)
 
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
@@ -117,10 +118,7 @@ def _check_size(name: str, values: NDArray) -> None:
 
 def _faces(faces: Sequence[Sequence[int]]) -> NDArray[np.float64]:
     """Vertices of each panel, counted from 1 and padded with nan."""
-    rows = np.full((len(faces), max(map(len, faces))), np.nan)
-    for row, face in zip(rows, faces, strict=True):
-        row[: len(face)] = face
-    return rows + 1.0
+    return np.transpose([*zip_longest(*faces, fillvalue=np.nan)]) + 1.0
 
 
 def _texts(result: xr.Dataset, names: Iterable[str], key: str) -> dict[str, str]:

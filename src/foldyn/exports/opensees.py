@@ -38,13 +38,10 @@ def model(shell: CreasedShell, tie: float = TIE) -> Iterator[Command]:
         yield "node", number, *point
     for number, sheet in enumerate(shell.sheets, 1):
         yield from _section(number, sheet)
-    for number, (nodes, kind) in enumerate(
-        zip(shell.triangles.tolist(), shell.kind, strict=True), 1
-    ):
-        own = [node + 1 for node in nodes]
+    for number, (own, kind) in enumerate(zip(shell.triangles + 1, shell.kind, strict=True), 1):
         turned = shell.sheets[kind].orthotropic
         axes = ("-local", *shell.axes[number - 1, 0].tolist()) if turned else ()
-        yield "element", "ASDShellT3", number, *own, int(kind) + 1, "-corotational", *axes
+        yield "element", "ASDShellT3", number, *own.tolist(), int(kind) + 1, "-corotational", *axes
     yield "uniaxialMaterial", "Elastic", TIE_MATERIAL, tie * shell.membrane
     yield from _springs(shell)
     for node in np.flatnonzero(shell.held.any(axis=1) | shell.clamped).tolist():

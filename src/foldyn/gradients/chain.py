@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.cases import Case
-from foldyn.errors import InputError
+from foldyn.errors import InputError, within
 from foldyn.gradients.expressions import Expression
 from foldyn.gradients.measures import Derivative, Seeds
 from foldyn.gradients.parameters import SHORTER, STEP, Differentiated, Parameters
@@ -76,10 +75,10 @@ class Chain(NamedTuple):
         value, parts = one.expression.value_and_slopes(values)
         total = _Changes({}, {}, {})
         for name, (measure, derivative) in one.measures.items():
-            with said_of(measure.text):
+            with within(f"{measure.text}: "):
                 if parts[name]:  # a zero factor needs no derivative
                     total.add(self._of_measure(measure, derivative, values[name]), parts[name])
-        with said_of(one.text):
+        with within(f"{one.text}: "):
             return value, self._by_parameters(total)
 
     def _of_measure(self, measure: Asked, derivative: Derivative, value: float) -> _Changes:
@@ -199,11 +198,11 @@ def beside(
                 measure.number(found.result, case, shared)
                 text, through[measure.text] = measure.text, measure.measure.through
                 subject = shared.get(through[text], found.result)
-                with said_of(text):
+                with within(f"{text}: "):
                     numbers[text] = derivative.beside(subject, case, **measure.arguments)
 
     def values(other: Case) -> dict[str, float]:
-        with said_of(", ".join(numbers)):
+        with within(f"{', '.join(numbers)}: "):
             near = found.beside(other)
         subjects = {each: each(near, other) if each else near for each in {*through.values()}}
         return {
@@ -216,12 +215,3 @@ def beside(
         return {}
     rates = differenced(design, values, [STEP])
     return {text: [rates[f"{text}{k}"] for k in range(len(own))] for text, own in numbers.items()}
-
-
-@contextmanager
-def said_of(text: str) -> Iterator[None]:
-    """Prefix an `InputError` with the text of the measure."""
-    try:
-        yield
-    except InputError as error:
-        raise InputError(f"{text}: {error}") from None

@@ -18,7 +18,7 @@ from scipy import sparse
 from foldyn.condensation.term import SuperelementsTerm, add_mass_products
 from foldyn.dynamics.modal_damping import soft_at_rest
 from foldyn.gradients.parameters import nothing
-from foldyn.gradients.path import Balance
+from foldyn.gradients.path import Balance, seen_through
 from foldyn.linear.linearized import Linearized
 from foldyn.materials import HingeLaw
 from foldyn.materials.series import in_series
@@ -142,7 +142,8 @@ class Products:
         state : derivatives (m,) of the quantity with respect to the state.
         """
         if self._moves:
-            self._balance.add_seen(state, self._balanced, total, self._factor)
+            adjoint = self._balance.under(state)
+            seen_through(self._case, self.q, state, adjoint, self._balanced, total, self._factor)
 
 
 def refuse(linear: Linearized, what: str) -> None:

@@ -118,10 +118,7 @@ def _extreme(sign: float) -> Derivative:
 def _trapezoid(result: xr.Dataset) -> NDArray:
     """Weights (k,), s, of samples in a time integral by trapezoids."""
     step = np.diff(result["time"].values)
-    weights = np.zeros(len(step) + 1)
-    weights[:-1] += 0.5 * step
-    weights[1:] += 0.5 * step
-    return weights
+    return 0.5 * (np.append(step, 0.0) + np.append(0.0, step))
 
 
 def _mean_square(result: xr.Dataset, motion: NDArray) -> NDArray:
@@ -322,16 +319,10 @@ def _climb(start: int, end: int) -> Derivative:
     def numbers(landscape: Landscape, case: Case, at: Any) -> Gradient:
         if not case.imposed_terms:
             return {}
-        high, low = at
-        motion = sum((vector for vector, _ in case.imposed_terms), np.zeros_like(high.displacement))
-        size = np.abs(motion).max()
-        found = {}
-        for k in range(len(case.imposed_terms)):  # through forces at supports that move farther
-            found[f"imposed.{k}"] = case.imposed * sum(
-                sign * state.stroke / size * _forces(case, state.displacement)
-                for sign, state in ((1.0, high), (-1.0, low))
-            )
-        return found
+        motion = sum(vector for vector, _ in case.imposed_terms)
+        high, low = (state.stroke * _forces(case, state.displacement) for state in at)
+        by_motion = case.imposed * (high - low) / np.abs(motion).max()  # as supports move farther
+        return {f"imposed.{k}": by_motion for k in range(len(case.imposed_terms))}
 
     return Derivative(_nothing, frozen, numbers, places, cut=True)
 

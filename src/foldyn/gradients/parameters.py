@@ -265,13 +265,14 @@ class Parameters:
                 far = at(direction, 2.0 * step), at(direction, -2.0 * step)
                 if all(_smooth(*(one[key] for one in (*near, *far))) for key in here.numbers):
                     break
+            found = {}
             for key, each in here.numbers.items():
-                if _kinked(each, *(one[key] - each for one in (*near, *far))):
+                ahead, behind, far_ahead, far_behind = (one[key] - each for one in (*near, *far))
+                if _kinked(each, ahead, behind, far_ahead, far_behind):
                     warn(KINK.format(name, key), "gradients.md#where-there-is-no-gradient")
-            return {
-                key: _difference(step, *(each[key] for each in (*near, *far, here.numbers)))
-                for key in here.numbers
-            }
+                rise = 8.0 * (ahead - behind) - (far_ahead - far_behind)
+                found[key] = _seen(rise / (12.0 * step), each)
+            return found
 
         entry = {key: np.zeros(np.shape(each), np.int64) for key, each in here.numbers.items()}
         if value.size > 1 and (entry := self._told_apart(at, size, here.numbers)) is None:
@@ -317,14 +318,6 @@ class Parameters:
             for key in columns[0]
         }
         return Slope(by, len(size))
-
-
-def _difference(
-    step: float, ahead: NDArray, behind: NDArray, far_ahead: NDArray, far_behind: NDArray,
-    here: NDArray,
-) -> NDArray:  # fmt: skip
-    """Derivative of numbers, from values one and two steps ahead and behind."""
-    return _seen((8.0 * (ahead - behind) - (far_ahead - far_behind)) / (12.0 * step), here)
 
 
 def _smooth(ahead: NDArray, behind: NDArray, far_ahead: NDArray, far_behind: NDArray) -> bool:

@@ -95,21 +95,15 @@ class Balance:
             )
         return self.case.constraints.displacement(out)
 
-    def add_seen(
-        self, by_state: NDArray, pullback: Pullback, total: dict[str, NDArray], factor: float = 1.0
-    ) -> None:
-        """Add to a gradient the part due to the change of the state, with loads times a factor.
-
-        by_state : derivatives (m,) of the quantity with respect to the dofs at fixed numbers.
-        """
-        seen_through(self.case, self.q, by_state, self.under(by_state), pullback, total, factor)
-
 
 def seen_through(
     case: Case, q: NDArray, by_state: NDArray, adjoint: NDArray, pullback: Pullback,
     total: dict[str, NDArray], factor: float,
 ) -> None:  # fmt: skip
-    """Add to a gradient -adjoint' dR and the effect of imposed displacements; R = F - factor p."""
+    """Add to a gradient -adjoint' dR and the effect of imposed displacements; R = F - factor p.
+
+    by_state : derivatives (m,) of the quantity with respect to the dofs at fixed numbers.
+    """
     pullback.clear()
     product = pullback.at(q, adjoint)
     for name, out in pullback.gradient.items():
@@ -201,28 +195,22 @@ class PathGradient(Differentiated):
         if not (moved.any() or pulled.any()):
             return
         self._check_given(k)
-        by_state, size = np.zeros(len(q)), u.size
-        by_state[:size] += moved
-        if pulled.any():
-            weight = np.zeros(len(q))
-            weight[:size] = case.constraints.reactions.T @ pulled
-            self._pullback.clear()
-            by_state += self._pullback.at(q, weight)
-            for name, out in self._pullback.gradient.items():
-                total[name] += out
-            for j in range(len(case.load_terms)):
-                total[f"load.{j}"] -= factor * weight[:size].reshape(-1, 3)
+        by_state, weight = np.zeros((2, len(q)))
+        by_state[: u.size] += moved
+        if pulled.any():  # reactions are weight' R
+            weight[: u.size] = case.constraints.reactions.T @ pulled
         balance = self._balances.setdefault(k, Balance(case, q))
-        balance.add_seen(by_state, self._pullback, total, factor)
+        adjoint = balance.under(by_state + self._pullback.at(q, weight)) - weight
+        seen_through(case, q, by_state, adjoint, self._pullback, total, factor)
 
     def _add_factor(
         self, moved: Moved, weight: NDArray, seed: float, total: dict[str, NDArray]
     ) -> None:
         """Add the derivatives of a load factor, df = -w' R_p dp / (w' R_f), times a seed."""
         case, q = self.case, self.case.body.dofs(moved.displacement)
-        growing = sum((vector for vector, _ in case.load_terms), np.zeros_like(moved.displacement))
-        motion = sum(
-            (vector for vector, _ in case.imposed_terms), np.zeros_like(moved.displacement)
+        growing, motion = (
+            sum((vector for vector, _ in terms), np.zeros_like(moved.displacement))
+            for terms in (case.load_terms, case.imposed_terms)
         )
         rate = case.body.tangent(q)[:, : motion.size] @ motion.ravel()
         rate[: growing.size] -= growing.ravel()

@@ -159,7 +159,11 @@ def sensitivity(
         slopes[LENGTH] = _by_lengths(slopes[LENGTH], found.numbers(case).numbers)
     direction = None if along is None else _direction(along, design)
     if direction is not None and isinstance(found, ModesGradient):
-        found = found.along(lambda gradient: _rate(slopes, direction, gradient))
+        found = found.along(
+            lambda gradient: sum(
+                float(rate @ slopes[name].pulled(gradient)) for name, rate in direction.items()
+            )
+        )
     shared: dict[Any, Any] = {}
     apart = beside(found, case, design, wanted, shared)
     chain = Chain(found, case, design, slopes, cut, shared, apart)
@@ -192,9 +196,7 @@ class Sourced(NamedTuple):
         try:
             return KINDS[self.kind](case, self.arguments)
         except InputError as error:
-            if error.field:
-                raise error.within("analysis.") from None
-            raise InputError(f": {error}", "analysis") from None
+            raise error.within(f"analysis{'.' if error.field else ': '}") from None
 
 
 def source_of(build: Source, parameters: Any, analysis: Mapping[str, Any] | None) -> Sourced:
@@ -360,20 +362,14 @@ def _wanted(measures: Any, kind: str) -> list[Wanted]:
     found = []
     for k, text in enumerate(texts):
         with within(f"measures[{k}]"):
-            found.append(_of_registry(text, kind))
+            expression, own = parse(text), {}
+            for name in expression.measures:
+                one = one_number(name, kind)
+                own[name] = one, derivative_of(one)
+            found.append(Wanted(text, expression, own))
     if not found:
         raise InputError(': none; give at least one, such as "frequency[1]"', "measures")
     return found
-
-
-def _of_registry(text: str, kind: str) -> Wanted:
-    """An expression of registered measures."""
-    expression = parse(text)
-    measures = {}
-    for name in expression.measures:
-        one = one_number(name, kind)
-        measures[name] = one, derivative_of(one)
-    return Wanted(text, expression, measures)
 
 
 def _own(name: str, pair: Any) -> Wanted:
@@ -382,13 +378,9 @@ def _own(name: str, pair: Any) -> Wanted:
         raise InputError(
             f" = {show(pair)}: give a pair of a function and its derivative", f"measures.{name}"
         )
-    one = of_callable(name, pair[0])
-    return Wanted(name, parse(name), {name: (one, Derivative(pair[1], _own_of(pair[0])))})
-
-
-def _own_of(function: Callable[..., float]) -> Callable[..., Callable[[Case], float]]:
-    """A user's function of the case, with the result held fixed."""
-    return lambda result, case: lambda other: float(function(result, other))
+    function, seeds = pair
+    frozen = Derivative(seeds, lambda result, case: lambda other: float(function(result, other)))
+    return Wanted(name, parse(name), {name: (of_callable(name, function), frozen)})
 
 
 # ------------------------------------------------------------------ directions
@@ -401,10 +393,3 @@ def _direction(along: Values, design: Parameters) -> dict[str, NDArray]:
         value = design.values[name]
         found[name] = np.broadcast_to(rate, value.shape).ravel() if value.ndim else rate.ravel()
     return found
-
-
-def _rate(
-    slopes: Mapping[str, Slope], direction: Mapping[str, NDArray], gradient: Gradient
-) -> float:
-    """Derivative of a quantity in a direction, from its gradient."""
-    return sum(float(rate @ slopes[name].pulled(gradient)) for name, rate in direction.items())

@@ -40,6 +40,7 @@ from foldyn.cases.directions import AXES
 from foldyn.errors import InputError, quietly
 from foldyn.gradients.linearized import Products, refuse
 from foldyn.gradients.parameters import Differentiated, Gradient, check_known
+from foldyn.gradients.path import free_block
 from foldyn.linear.excitation import drive_of, drive_terms
 from foldyn.linear.frequency_domain import dynamic_stiffness
 from foldyn.linear.frf import frf, quantity_of
@@ -183,9 +184,8 @@ class ModesGradient(Differentiated):
         """Refuse derivatives of one of several modes with equal frequency."""
         for first, last in self._clusters():
             values = by_value[first:last]
-            sum_alone = not by_shape[:, first:last].any() and np.ptp(values) <= SAME * np.abs(
-                values
-            ).max(initial=0.0)
+            sum_alone = np.ptp(values) <= SAME * np.abs(values).max()
+            sum_alone &= not by_shape[:, first:last].any()
             if not sum_alone and not self._parted:
                 raise InputError(
                     f"modes {first + 1} to {last} have the same frequency and may swap: single "
@@ -312,11 +312,9 @@ class FrfGradient(Differentiated):
         return Products(self._linear, False, np.zeros_like(self._linear.displacement))
 
     @cached_property
-    def _stiffness(self) -> sparse.csr_array:
+    def _stiffness(self) -> sparse.csc_array:
         """Stiffness matrix K0 (nf, nf)."""
-        tangent = self.case.constraints.matrix(self.case.body.tangent(self._reference.q))
-        free = self._linear.free
-        return sparse.csr_array(sparse.csr_array(tangent)[free][:, free])
+        return free_block(self.case, self._reference.q, self._linear.free)[1]
 
 
 def _check_method(given: Mapping[str, Any]) -> None:

@@ -44,10 +44,9 @@ def places_of(pairs: NDArray) -> tuple[NDArray, NDArray]:
 
 def assembled(pairs: NDArray, blocks: NDArray, size: int) -> sparse.csr_array:
     """Matrix (size, size) of blocks (k, 3, 3) at pairs (k, 2) of nodes; duplicates are added."""
-    return sparse.csr_array(sparse.coo_array((blocks.ravel(), places_of(pairs)), (size, size)))
+    return sparse.csr_array((blocks.ravel(), places_of(pairs)), (size, size))
 
 
 def of_elements(dofs: NDArray, matrices: NDArray, size: int) -> sparse.csr_array:
     """Matrix (size, size) of elements with dofs (n, k) and matrices (n, k, k), which are added."""
-    entries = (matrices.ravel(), tuple(pairs_within(dofs).T))
-    return sparse.csr_array(sparse.coo_array(entries, (size, size)))
+    return sparse.csr_array((matrices.ravel(), tuple(pairs_within(dofs).T)), (size, size))

@@ -146,7 +146,7 @@ def following_tangent(loads: Following, u: NDArray, factor: NDArray) -> sparse.c
     row, column = following_places(loads)
     values = np.empty(len(row))
     put_following(loads, np.ascontiguousarray(u, float).reshape(-1), factor, False, values)
-    return sparse.coo_array((values, (row, column)), (u.size, u.size)).tocsr()
+    return sparse.csr_array((values, (row, column)), (u.size, u.size))
 
 
 def asymmetry(matrix: sparse.csr_array) -> float:

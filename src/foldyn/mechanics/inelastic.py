@@ -379,8 +379,7 @@ class HingeMemory(Term):
         out = np.zeros((len(self.own.rest), WIDTH))
         memory_gradients(self.own, np.ascontiguousarray(q, float), out)
         row = np.repeat(np.arange(len(out)), WIDTH)
-        entries = (out.ravel(), (row, self.own.dofs.ravel()))
-        rates = sparse.csr_array(sparse.coo_array(entries, shape=(len(out), size)))
+        rates = sparse.csr_array((out.ravel(), (row, self.own.dofs.ravel())), (len(out), size))
         rates.eliminate_zeros()
         return rates
 

@@ -189,7 +189,7 @@ class MembranesTerm(Term):
         entries = self._entries(q, q, np.zeros(self.membranes.stiffness.shape[1:]))
         alone = np.isin(places, self.membranes.gives).all(axis=0)
         tangent, kept = (
-            sparse.csr_array(sparse.coo_array((entries[own], tuple(places[:, own])), size))
+            sparse.csr_array((entries[own], tuple(places[:, own])), size)
             for own in (slice(None), alone)
         )
         return Unstrained(tangent, kept, lambda motion: 0.0)

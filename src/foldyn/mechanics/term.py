@@ -227,8 +227,7 @@ class Term(ABC):
 
     def tangent(self, q: NDArray, floor: float = -np.inf) -> sparse.csr_array:
         """Tangent as a matrix (m, m), N/m."""
-        entries = (self.entries(q, floor), self.places)
-        return sparse.csr_array(sparse.coo_array(entries, shape=(q.size, q.size)))
+        return sparse.csr_array((self.entries(q, floor), self.places), (q.size, q.size))
 
     def unstrained(self, q: NDArray) -> Unstrained | None:
         """The term without strain at q, with linear laws; None if it resists nothing."""
@@ -251,8 +250,7 @@ class Term(ABC):
 
     def damping(self, q: NDArray) -> sparse.csr_array:
         """Damping as a matrix (m, m), N s/m."""
-        entries = (self.damping_entries(q), self.damping_places)
-        return sparse.csr_array(sparse.coo_array(entries, shape=(q.size, q.size)))
+        return sparse.csr_array((self.damping_entries(q), self.damping_places), (q.size, q.size))
 
     # ------------------------------------------------------------------ gradients
     def arrays(self) -> Any:

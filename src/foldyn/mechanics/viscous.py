@@ -319,8 +319,8 @@ class ViscousTerm(Term):
         some = turn.any(axis=1)
         row, end = np.nonzero(turn[some])
         values = turn[some][row, end] / turn[some].max(axis=1)[row]
-        entries = (values, (row, np.searchsorted(hidden, dofs[some][row, end])))
-        return sparse.csr_array(sparse.coo_array(entries, shape=(int(some.sum()), len(hidden))))
+        column = np.searchsorted(hidden, dofs[some][row, end])
+        return sparse.csr_array((values, (row, column)), (int(some.sum()), len(hidden)))
 
     def placed(self, order: NDArray, before: Assembly) -> ViscousTerm:
         """The term with nodes in memory order; see `Term`."""

@@ -297,10 +297,9 @@ def plate_frequency(pattern: Pattern, sheet: Sheet, rigid: Collection[int] = ())
     panels with five or more corners. Returns the lowest frequency of all panels that are not rigid;
     inf if all are rigid, nan for a sheet without density.
     """
-    count, x = len(pattern.faces), pattern.vertices
+    count = len(pattern.faces)
     speed = (sheet.values("bending_modulus", count) / sheet.values("areal_density", count)) ** 0.5
-    sides = (x[list(face)] - np.roll(x[list(face)], 1, axis=0) for face in pattern.faces)
-    longest = np.array([np.linalg.norm(side, axis=1).max() for side in sides])
+    longest = np.array([sides.max() for sides in pattern.sides])
     side2 = np.maximum(longest**2, pattern.face_areas)
     frequency = FIRST_OF_A_SQUARE / (2.0 * np.pi) * speed / side2
     return float(np.delete(frequency, list(rigid)).min(initial=np.inf))

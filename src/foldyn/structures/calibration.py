@@ -97,16 +97,11 @@ def _merlin2_corners(kb: NDArray, rows: NDArray, mesh: Mesh, pattern: Pattern) -
     out = np.empty_like(kb)
     for p, spokes in enumerate(rows):
         panel = int(mesh.inner_panel[spokes[0]])
-        listed = _listed_corners(pattern, panel)
+        m = len(pattern.faces[panel])
+        listed = (-np.arange(m) if pattern.flipped[panel] else np.arange(m)) % m  # order of input
         rank = np.argsort(np.array(pattern.faces[panel])[listed])
-        out[p, np.array(listed)[rank]] = kb[p, listed]
+        out[p, listed[rank]] = kb[p, listed]
     return out
-
-
-def _listed_corners(pattern: Pattern, panel: int) -> list[int]:
-    """Positions of a face's corners in the order of input."""
-    m = len(pattern.faces[panel])
-    return [0, *range(m - 1, 0, -1)] if pattern.flipped[panel] else list(range(m))
 
 
 def bar_areas(

@@ -34,7 +34,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
-from scipy.linalg import null_space
+from scipy.linalg import block_diag, null_space
 from scipy.sparse.linalg import splu
 
 from foldyn.algebra.condensing import Condensing
@@ -50,6 +50,7 @@ from foldyn.structures.panel_plate import (
     plate_blocks,
     shared,
     sides_of,
+    symmetric,
 )
 
 COARSE, FINE = 8, 16  # pieces per edge in the two meshes
@@ -71,10 +72,7 @@ def panel_stiffness(kinds: Sequence[tuple[Outline, float]]) -> list[NDArray]:
         held = heights_and_slopes(panel)
         stiffness = held.T @ extrapolated(*both, ratio=FINE / COARSE) @ held
         turned = least_heights(panel, len(stiffness))
-        out = turned.T @ stiffness @ turned
-        out = 0.5 * (out + out.T)
-        out.setflags(write=False)
-        found.append(out)
+        found.append(symmetric(turned.T @ stiffness @ turned))
     return found
 
 
@@ -94,10 +92,7 @@ def least_heights(panel: Outline, size: int) -> NDArray:
     """Matrix (size, q) from angles to the least heights with the spoke turns, and other angles."""
     points, corners = _points(panel), len(panel.corners)
     spokes = spoke_turns(points, corners) if panel.center else np.zeros((0, len(points)))
-    out = np.zeros((size, len(spokes) + size - len(points)))
-    out[: len(points), : len(spokes)] = np.linalg.pinv(spokes, rcond=1e-9)
-    out[len(points) :, len(spokes) :] = np.eye(size - len(points))
-    return out
+    return block_diag(np.linalg.pinv(spokes, rcond=1e-9), np.eye(size - len(points)))
 
 
 def heights_and_slopes(panel: Outline) -> NDArray:
@@ -179,10 +174,7 @@ def panel_mass(panel: Outline, poissons_ratio: float) -> NDArray:
     linear = np.column_stack([np.ones(len(x)), x @ level])
     along = linear @ np.linalg.pinv(linear)
     facets = np.array(facets_of(x, len(panel.corners)))[: None if panel.center else 1]
-    out = out + along.T @ (mass_of(x, facets, np.eye(len(x))) - out) @ along
-    out = 0.5 * (out + out.T)
-    out.setflags(write=False)
-    return out
+    return symmetric(out + along.T @ (mass_of(x, facets, np.eye(len(x))) - out) @ along)
 
 
 def _followed(panel: Outline, poissons_ratio: float, n: int) -> tuple[NDArray, NDArray, NDArray]:
@@ -312,8 +304,7 @@ def _entries(
     cut, points = _cut(m, center, n), np.array([_points(panel) for panel in panels])
     facets = points[:, facets_of(points[0], m)[: None if center else 1]].reshape(-1, 3, 2)
     blocks = plate_blocks(facets, np.ones((len(facets), 3)), poissons_ratio)
-    none = (False,)
-    free = 1.0 - np.array([[*own.straight, *own.clamped, *none] for own in panels]).T[cut.edge]
+    free = 1.0 - np.array([[*own.straight, *own.clamped, False] for own in panels]).T[cut.edge]
     row, column = cut.pairs.T
     values = cut.factors @ blocks.reshape(len(panels), -1).T * (free[row] * free[column])
     values[row == column] += 1.0 - free
@@ -333,8 +324,8 @@ def _balanced(
     lengths = np.linalg.norm(np.roll(points[:, :m], -1, axis=1) - points[:, :m], axis=2)
     scale = np.concatenate([np.ones((len(panels), stiffness.shape[1] - m)), lengths], axis=1)
     stiffness *= scale[:, :, None] * scale[:, None, :]
-    corners = (True,) * points.shape[1]
-    held = np.array([[*corners, *own.creased, *own.bowed] for own in panels])
+    held = np.ones((len(panels), stiffness.shape[1]), bool)
+    held[:, points.shape[1] :] = [own.creased + own.bowed for own in panels]
     straight = np.zeros(held.shape, bool)
     straight[:, -m:] = [own.straight for own in panels]
     known = held | straight

@@ -193,8 +193,8 @@ def discretize(
     clamped_panel = mesh.triangle_panel[clamped_triangle]
     modulus = sheet.values("bending_modulus", len(pattern.faces))[clamped_panel]
     turning = held_edges.clamp_stiffness(x, clamps, modulus)
+    stiff = rigid_panels(options.rigid, len(pattern.faces))
     if options.scheme == "n5b8e":
-        stiff = rigid_panels(options.rigid, len(pattern.faces))
         springs = dict(zip(edges, turning.tolist(), strict=True))
         held = held_edges.straight_in_bending(options.straight, options.guided, pattern, sheet)
         plates = edge_plates(mesh, pattern, sheet, held, stiff, springs)
@@ -208,7 +208,6 @@ def discretize(
 
     coupled, gives = (), np.zeros((0, 2), np.int64)
     if options.membrane == "panel":
-        stiff = rigid_panels(options.rigid, len(pattern.faces))
         held = [*held_edges.straight_in_plane(options.straight, options.guided, pattern), *edges]
         coupled, gives = membranes(
             mesh, pattern, sheet, held, stiff, options.scheme == "n5b8e",

@@ -71,33 +71,22 @@ def equi_inertial_acute(surface: Surface) -> sparse.csr_array:
 
 
 def _distribute(surface: Surface, name: str, swapped: bool) -> sparse.csr_array:
-    corners = _quads(surface, name)
-    x = surface.nodes[corners]
-    even = np.linalg.norm(x[:, 2] - x[:, 0], axis=1)
-    odd = np.linalg.norm(x[:, 3] - x[:, 1], axis=1)
-    heavy_even = (even <= odd * (1.0 + 1e-9)) != swapped
-    heavy, light = 1.0 / 4.0, 1.0 / 36.0
-    shares = np.where(
-        heavy_even[:, None], [heavy, light, heavy, light], [light, heavy, light, heavy]
-    )
-    total = surface.panel_mass
-    n = len(surface.nodes)
-    mass = np.bincount(corners.ravel(), (shares * total[:, None]).ravel(), minlength=n)
-    return lumped(mass + np.bincount(surface.centers, 4.0 / 9.0 * total, minlength=n))
-
-
-def _quads(surface: Surface, name: str) -> NDArray:
-    other = [
-        p
-        for p, (face, center) in enumerate(zip(surface.faces, surface.centers, strict=True))
-        if len(face) != 4 or center < 0
-    ]
+    other = [p for p, c in enumerate(surface.centers) if len(surface.faces[p]) != 4 or c < 0]
     if other:
         raise InputError(
             f'mass = "{name}" is defined for N5B8 quadrilaterals only, panel {other[0]} is '
             'not one: use mass = "mixed_voronoi" (any panel) or "inertia_exact"'
         )
-    return np.array(surface.faces, np.int64)
+    corners = np.array(surface.faces, np.int64)
+    x = surface.nodes[corners]
+    even = np.linalg.norm(x[:, 2] - x[:, 0], axis=1)
+    odd = np.linalg.norm(x[:, 3] - x[:, 1], axis=1)
+    heavy_even = (even <= odd * (1.0 + 1e-9)) != swapped
+    shares = np.where(heavy_even[:, None] == [True, False, True, False], 1.0 / 4.0, 1.0 / 36.0)
+    total = surface.panel_mass[:, None]
+    nodes = np.column_stack([corners, surface.centers])
+    masses = np.column_stack([shares * total, 4.0 / 9.0 * total])
+    return lumped(np.bincount(nodes.ravel(), masses.ravel(), minlength=len(surface.nodes)))
 
 
 def panel(surface: Surface) -> sparse.csr_array:

@@ -13,7 +13,7 @@ from scipy.sparse.csgraph import breadth_first_order
 from foldyn.errors import InputError
 from foldyn.mechanics.triangle import turned_axes
 from foldyn.patterns import Pattern
-from foldyn.patterns.topology import around, at_junctions, edge_of
+from foldyn.patterns.topology import around, at_junctions
 from foldyn.structures.ply import expansion as plies_expansion
 from foldyn.structures.sheet import Sheet
 
@@ -146,7 +146,8 @@ def _projected(vector: NDArray, normals: NDArray, panels: NDArray, place: str) -
 
 def _carried(pattern: Pattern, edge: tuple[int, int], degrees: float, place: str) -> NDArray:
     """Directions (np, 3) at an angle from an edge, continued over creases as in the flat sheet."""
-    start = [p for p, face in enumerate(pattern.faces) if edge_of(*edge) in _edges(face)]
+    ways = {edge, edge[::-1]}
+    start = [p for p, face in enumerate(pattern.faces) if not ways.isdisjoint(around(face))]
     if not start:
         raise InputError(f"{place}.edge = {list(edge)}: the pattern has no such edge")
     inner = np.concatenate([pattern.creases, pattern.welds])
@@ -180,7 +181,3 @@ def _carried(pattern: Pattern, edge: tuple[int, int], degrees: float, place: str
                 "not lie flat; give a vector, or panels of their own direction"
             )
     return out
-
-
-def _edges(face: Sequence[int]) -> set[tuple[int, int]]:
-    return {edge_of(a, b) for a, b in around(face)}

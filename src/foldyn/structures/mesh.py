@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -134,16 +135,13 @@ def _mesh(
         for panel, (a, b) in zip(inner_panel, inner, strict=True)
     ]
 
-    def hinge(edge: list[int], panels: list[int], ways: list[int]) -> tuple[int, ...]:
-        there, back = edge[:: ways[0]], edge[:: -ways[1]]
-        return *edge, third[panels[0], there[0], there[1]], third[panels[1], back[0], back[1]]
+    def hinges(*creases: NDArray) -> NDArray:
+        rows = []
+        for edge, panels, ways in zip(*(each.tolist() for each in creases), strict=True):
+            there, back = edge[:: ways[0]], edge[:: -ways[1]]
+            rows.append((*edge, third[panels[0], *there], third[panels[1], *back]))
+        return _rows(rows, 4)
 
-    folds = map(
-        hinge, pattern.creases.tolist(), pattern.crease_faces.tolist(), pattern.crease_ways.tolist()
-    )
-    welds = map(
-        hinge, pattern.welds.tolist(), pattern.weld_faces.tolist(), pattern.weld_ways.tolist()
-    )
     mesh = Mesh(
         nodes=nodes,
         centers=centers,
@@ -152,8 +150,8 @@ def _mesh(
         bends=_rows(bends, 4),
         triangles=_rows(triangles, 3),
         triangle_panel=np.array(triangle_panel, np.int64),
-        folds=_rows(list(folds), 4),
-        welds=_rows(list(welds), 4),
+        folds=hinges(pattern.creases, pattern.crease_faces, pattern.crease_ways),
+        welds=hinges(pattern.welds, pattern.weld_faces, pattern.weld_ways),
     )
     check_triangles(nodes, mesh.triangles, mesh.triangle_panel, pattern, remedy)
     return mesh
@@ -299,11 +297,9 @@ def polygon_center(x: NDArray) -> NDArray:
         return (np.abs(points @ normal.T - offset) / length).sum(axis=1)
 
     crossings = [np.zeros(2)]
-    for a in range(len(pairs)):
-        for b in range(a + 1, len(pairs)):
-            system = normal[[a, b]]
-            if abs(np.linalg.det(system)) > 1e-9:
-                crossings.append(np.linalg.solve(system, offset[[a, b]]))
+    for two in map(list, combinations(range(len(pairs)), 2)):
+        if abs(np.linalg.det(normal[two])) > 1e-9:
+            crossings.append(np.linalg.solve(normal[two], offset[two]))
     candidates = np.array(crossings)
     value = total(candidates)
     tied = value <= value.min() + 1e-9

@@ -31,7 +31,7 @@ from foldyn.jit.eights import COUNT
 from foldyn.mechanics.block_matrix import pairs_within
 from foldyn.mechanics.triangle import PRODUCTS, add_triangles, squares
 from foldyn.structures.graded import ROOM, Grading, graded
-from foldyn.structures.panel_plate import Outline, across_edges, meshed, shared, sides_of
+from foldyn.structures.panel_plate import Outline, across_edges, meshed, shared, sides_of, symmetric
 
 COARSE, FINE = 4, 8  # pieces per edge in the two meshes; twice as many for triangular panels
 RAYS = 2  # rays of a graded mesh in half a corner
@@ -87,18 +87,12 @@ def membrane_stiffness(given: Sequence[tuple]) -> list[NDArray]:
     """
     kinds = [Kind(*each) for each in given]
     if kinds[0].grading:
-        return _symmetric(_condensed(kinds, _graded(kinds)))
+        return list(symmetric(_condensed(kinds, _graded(kinds))))
     more = 1 if kinds[0].outline.center else 2
     coarse, fine = (
         _condensed(kinds, [_even(kind.outline, more * n) for kind in kinds]) for n in (COARSE, FINE)
     )
-    return _symmetric(extrapolated(coarse, fine, FINE / COARSE))
-
-
-def _symmetric(stiffness: NDArray) -> list[NDArray]:
-    stiffness = 0.5 * (stiffness + np.swapaxes(stiffness, 1, 2))
-    stiffness.setflags(write=False)
-    return list(stiffness)
+    return list(symmetric(extrapolated(coarse, fine, FINE / COARSE)))
 
 
 @dataclass(frozen=True, eq=False)

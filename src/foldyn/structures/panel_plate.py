@@ -118,15 +118,16 @@ def facets_of(points: NDArray, corners: int) -> list[tuple[int, int, int]]:
 
 def mass_of(points: NDArray, triangles: NDArray, heights: NDArray) -> NDArray:
     """Mass matrix (k, k) of shapes with heights (points or more, k), linear on triangles."""
-    shape, part = heights[triangles], _parts(points, triangles)
-    return np.einsum("tak,ab,tbl,t->kl", shape, TRIANGLE_MASS, shape, part)
+    shape, corners = heights[triangles], points[triangles]
+    area = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1]))
+    return np.einsum("tak,ab,tbl,t->kl", shape, TRIANGLE_MASS, shape, area / area.sum())
 
 
-def _parts(points: NDArray, triangles: NDArray) -> NDArray:
-    """Share (nt,) of each triangle in the total area."""
-    corners = points[triangles]
-    area = 0.5 * np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1]))
-    return area / area.sum()
+def symmetric(matrices: NDArray) -> NDArray:
+    """The symmetric part of matrices (..., k, k), read-only, as it is kept."""
+    out = 0.5 * (matrices + np.swapaxes(matrices, -1, -2))
+    out.setflags(write=False)
+    return out
 
 
 def meshed(
@@ -135,13 +136,11 @@ def meshed(
     """Points (p, ...), triangles, points at corners and center, and points along each edge."""
     points = x if center is None else np.concatenate([x, np.asarray(center)[None]])
     facets = [(0, 1, 2)] if center is None else facets_of(points, len(x))
-    i, j = (axis.ravel() for axis in np.meshgrid(np.arange(n + 1), np.arange(n + 1), indexing="ij"))
-    kept = i + j <= n
-    i, j = i[kept], j[kept]  # positions between the first corner and the two others, in n-ths
+    sums = np.add.outer(np.arange(n + 1), np.arange(n + 1))
+    i, j = np.nonzero(sums <= n)  # positions between the first corner and the two others, in n-ths
     place = np.full((n + 1, n + 1), -1)
     place[i, j] = np.arange(len(i))
-    up = np.argwhere(np.add.outer(np.arange(n + 1), np.arange(n + 1)) < n)
-    down = up[up.sum(axis=1) < n - 1]
+    up, down = np.argwhere(sums < n), np.argwhere(sums < n - 1)
     small = np.concatenate(
         [
             np.stack([place[*(up + step).T] for step in ((0, 0), (1, 0), (0, 1))], axis=1),

@@ -265,20 +265,16 @@ def _edge_and_degree() -> tuple[NDArray, NDArray]:
 
 def _line(t: NDArray, derivative: int) -> tuple[NDArray, NDArray]:
     """Two linear functions (n, 2) of coordinates t, and d functions that are 0 at both ends."""
-    linear, bows = (
-        np.stack([legendre.legval(t, c) for c in group], axis=-1)
-        for group in _polynomials(derivative)
-    )
+    linear, bows = (legendre.legval(t, group).T for group in _polynomials(derivative))
     return linear, bows
 
 
 @cache
-def _polynomials(derivative: int) -> tuple[list[NDArray], list[NDArray]]:
-    """Legendre coefficients of the functions of `_line`."""
-    ends = [np.array([0.5, -0.5]), np.array([0.5, 0.5])]
-    inner = [legendre.legint(np.eye(j + 1)[j], lbnd=-1.0) for j in range(1, DEGREES[1])]
-    linear, bows = ([legendre.legder(c, derivative) for c in group] for group in (ends, inner))
-    return linear, bows
+def _polynomials(derivative: int) -> tuple[NDArray, NDArray]:
+    """Legendre coefficients of the functions of `_line`, in columns."""
+    ends = np.array([[0.5, 0.5], [-0.5, 0.5]])
+    inner = legendre.legint(np.eye(DEGREES[1])[:, 1:], lbnd=-1.0)
+    return legendre.legder(ends, derivative), legendre.legder(inner, derivative)
 
 
 @cache
@@ -320,9 +316,7 @@ def _jacobian(x: NDArray, at: NDArray) -> NDArray:
     one = 1.0 + SIGNS[None] * at[:, None]
     by_xi = 0.25 * SIGNS[:, 0] * one[:, :, 1]
     by_eta = 0.25 * SIGNS[:, 1] * one[:, :, 0]
-    return np.stack([np.swapaxes(by @ x, 1, 2) for by in (by_xi, by_eta)], axis=0).transpose(
-        1, 3, 2, 0
-    )
+    return np.stack([by_xi @ x, by_eta @ x], axis=-1)
 
 
 def _gradients(x: NDArray, edge: int | None) -> tuple[NDArray, NDArray, NDArray]:

@@ -73,10 +73,7 @@ class Chords(NamedTuple):
 
     def turns(self, curvature: NDArray) -> NDArray:
         """Changes (n,), rad, of the angles for panel curvatures (np,), 1/m."""
-        change = np.zeros(self.panel.shape[1])
-        for panel, turn in zip(self.panel, self.turn, strict=True):
-            change -= curvature[panel] * turn
-        return change
+        return -(curvature[self.panel] * self.turn).sum(axis=0)
 
 
 def chords(x: NDArray, triangles: NDArray, panel: NDArray, hinges: NDArray) -> Chords:

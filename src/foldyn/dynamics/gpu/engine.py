@@ -87,15 +87,15 @@ class Launches:
         self._plans = plans
         self._dt = np.array([plan.dt for plan in plans])
         self._every = np.array([plan.every for plan in plans])
-        self._counts, self._count = host.counts, len(cases)
-        n, slots = host.counts.nodes, host.counts.slots
+        self._counts = host.counts
+        m, n, slots = len(cases), host.counts.nodes, host.counts.slots
         numbers = 3 * slots + host.counts.more
         room = 8 * (numbers + 6 * n)
         shared = not wide and room <= card.SHARED
-        own = self._count if not shared else 1
+        own = 1 if shared else m
         needed = card.size_of(tuple(host.elements)) + card.size_of(tuple(host.nodes))
-        needed += 8 * self._count * (12 * n + places.angle.shape[1]) + own * room
-        what = f"{self._count} models of {n} nodes" if self._count > 1 else f"a model of {n} nodes"
+        needed += 8 * m * (12 * n + places.angle.shape[1]) + own * room
+        what = f"{m} models of {n} nodes" if m > 1 else f"a model of {n} nodes"
         card.check_size(needed, what)
         self._rows = self._histories()
         load_row = host.nodes.load_row
@@ -106,11 +106,10 @@ class Launches:
         self._nodes = card.put(host.nodes)
         self._room = room if shared else 0
         plates = len(host.elements.plates) > 0
-        self._kernel, self._shape = kernel(method, wide, shared, plates), (self._count, n)
+        self._kernel, self._shape = kernel(method, wide, shared, plates), (m, n)
         self._supported = len(cases[0].system.supported)
         self._compiled: Any = None
-        self._from, self._hinges = places, places.angle.shape[1]
-        m = self._count
+        self._from = places
         if SIMULATED:
             self._threads, self._blocks = 2, 1 if wide else m
         else:
@@ -208,14 +207,12 @@ class Launches:
         span = card.put(Span(first, last, self._dt, self._every, sample))
         factor = cuda.to_device(self._factors(first, last))
         self._state.barrier.copy_to_device(np.zeros(1, np.int64))
+        given = self._elements, self._nodes, self._counts, span, factor
         if not SIMULATED and self._compiled is None:
-            self._fit_grid(
-                (self._elements, self._nodes, self._counts, span, factor, self._state, out)
-            )
+            self._fit_grid((*given, self._state, out))
             out = out._replace(energy=self._energies(count))
-        arguments = self._elements, self._nodes, self._counts, span, factor, self._state, out
         launched = self._compiled or self._kernel
-        launched[self._blocks, self._threads, 0, self._room](*arguments)
+        launched[self._blocks, self._threads, 0, self._room](*given, self._state, out)
         u, v, reaction, energy = (array.copy_to_host() for array in out)
         if self._wide:
             energy = energy.sum(axis=1, keepdims=True)
@@ -232,9 +229,8 @@ class Launches:
         if self._wide:
             made: Any = next(iter(self._compiled.overloads.values()))
             most = int(made.max_cooperative_grid_blocks(self._threads))
-            items = max(self._shape[1], self._hinges)
-            blocks = max(1, min(most, math.ceil(items / self._threads)))
-            self._blocks = blocks
+            items = max(self._shape[1], self._from.angle.shape[1])
+            self._blocks = max(1, min(most, math.ceil(items / self._threads)))
             self._set(self._from)
 
     def places(self) -> Places:

@@ -22,7 +22,6 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy import sparse
 
 from foldyn.algebra.superlu import SingularTangentError
 from foldyn.dynamics.implicit.matrix import StepMatrix
@@ -58,23 +57,18 @@ class TouchingNewton(Newton):
         body = scheme.packed.body
         self._contact = body.term(ContactTerm)
         self._tables = self._contact.tables
-        self._memory = body.kept(scheme.part, ContactTerm)
-        self._memory.counts.lagged = 1
+        self.memory: Memory = body.kept(scheme.part, ContactTerm)
+        self.memory.counts.lagged = 1
         self._free = np.zeros(3 * scheme.packed.system.rows, bool)
         self._free[matrix.free] = True
         self._moved = np.zeros((len(self._tables.planes), 3))  # planes at the step's start
-        self._pushed = self._memory.friction.copy()  # friction on nodes at the step's start
-        self._rubbed = np.zeros_like(self._memory.x)  # friction between panels at the step's start
+        self._pushed = self.memory.friction.copy()  # friction on nodes at the step's start
+        self._rubbed = np.zeros_like(self.memory.x)  # friction between panels at the step's start
         self._touched = False
-
-    @property
-    def memory(self) -> Memory:
-        """State of contact."""
-        return self._memory
 
     def begin(self) -> None:
         """Make the state of the last force evaluation the start of the next step."""
-        kept = self._memory
+        kept = self.memory
         self._moved[:], self._pushed[:] = kept.moved[:, :3], kept.friction
         self._touched = float(kept.facts.energy) > 0.0
         slip(self._tables, kept.x, kept)
@@ -84,7 +78,7 @@ class TouchingNewton(Newton):
 
     def works(self) -> tuple[float, float]:
         """Work (J) of moving planes in a solved step, and energy (J) dissipated by friction."""
-        kept, scheme, done, lost = self._memory, self.scheme, 0.0, 0.0
+        kept, scheme, done, lost = self.memory, self.scheme, 0.0, 0.0
         points = self._contact.points
         motion = points(scheme.moved()) - points(scheme.displacement())
         if len(self._moved):
@@ -99,8 +93,8 @@ class TouchingNewton(Newton):
 
     def _rub(self) -> NDArray:
         """Gradient (n, 3), N, of friction between panels, at the last force evaluation."""
-        force = np.zeros_like(self._memory.x)
-        add_rubs(self._tables, self._memory, force)
+        force = np.zeros_like(self.memory.x)
+        add_rubs(self._tables, self.memory, force)
         return force
 
     def solve(self, h: float, t: float) -> int:
@@ -120,7 +114,8 @@ class TouchingNewton(Newton):
             if verdict in (SOLVED, NOT_FINITE):
                 return verdict
             scheme.tangent(matrix, before, again)
-            matrix.added = self._tangent()
+            touching = scheme.contact_tangent(self._contact, self.memory)
+            matrix.added = touching if touching.nnz else None
             try:
                 matrix.factorize(scheme.weights(h))
             except SingularTangentError:
@@ -135,7 +130,7 @@ class TouchingNewton(Newton):
 
     def _passes_by(self, h: float, t: float) -> bool:
         """Solve a step without contact; return whether the result is indeed free of contact."""
-        scheme, kept, predicted = self.scheme, self._memory, self.scheme.shift.copy()
+        scheme, kept, predicted = self.scheme, self.memory, self.scheme.shift.copy()
         start, self.matrix.added = scheme.displacement().copy(), None
         if super().solve(h, t) == SOLVED and float(kept.facts.energy) == 0.0:
             end, moved = scheme.moved().copy(), kept.moved.copy()
@@ -150,11 +145,6 @@ class TouchingNewton(Newton):
     def _residual(self, h: float, t: float) -> tuple[float, float]:
         self.evaluations += 1
         return self.scheme.residual(h, t)
-
-    def _tangent(self) -> sparse.csr_array | None:
-        """Contact tangent at the last force evaluation; None if nothing touches."""
-        tangent = self.scheme.contact_tangent(self._contact, self._memory)
-        return tangent if tangent.nnz else None
 
     def _along(self, h: float, t: float, step: NDArray) -> tuple[float, float]:
         """Move along a step (rows, 3) as far as the line search allows; return residual norms."""
@@ -172,7 +162,7 @@ class TouchingNewton(Newton):
 
     def _clear(self, u: NDArray, step: NDArray, moves: NDArray) -> float:
         """Share of a step from u, both (rows, 3), without penetration, as planes move by (q, 3)."""
-        return self._contact.clear_with(self._memory, u, step, moves, KEEP)
+        return self._contact.clear_with(self.memory, u, step, moves, KEEP)
 
     def _predict(self, t: float) -> bool:
         """Shorten the predicted motion until nothing penetrates; return whether that is possible.
@@ -197,12 +187,12 @@ class TouchingNewton(Newton):
 
     def _start(self, u: NDArray, step: NDArray, moves: NDArray) -> float:
         """`_clear` from the start of the step, with planes where they are at this start."""
-        self._memory.moved[:, :3] = self._moved
+        self.memory.moved[:, :3] = self._moved
         return self._clear(u, step, moves)
 
     def _at(self, t: float) -> tuple[NDArray, NDArray]:
         """Displacement (rows, 3) at time t (s) for the current shift, and plane motion (q, 3)."""
-        scheme, kept = self.scheme, self._memory
+        scheme, kept = self.scheme, self.memory
         s, old = scheme.scratch, scheme.old
         place(scheme.packed.system, old.q + scheme.shift, old.w, t, s)
         move_planes(self._tables, s.factor, kept)

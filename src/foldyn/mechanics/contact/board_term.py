@@ -11,18 +11,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.jit.context import Context
-from foldyn.mechanics.contact.boards import (
-    BoardSheets,
-    Ride,
-    add_back,
-    board_tables,
-    carried,
-    curvature,
-    jacobian,
-    largest_turn,
-    put_points,
-    step_jacobian,
-)
+from foldyn.mechanics.contact import boards
 from foldyn.mechanics.contact.candidates import Tables
 from foldyn.mechanics.contact.ccd import clear_share
 from foldyn.mechanics.contact.contact_state import Memory
@@ -41,22 +30,23 @@ class BoardContactTerm(ContactTerm):
     also need the second derivative of y.
     """
 
-    sheets: BoardSheets
+    sheets: boards.BoardSheets
     shared = eased = False
 
     @cached_property
-    def _riding(self) -> tuple[Ride, NDArray, NDArray]:
-        return self.sheets.riding()
+    def _riding(self) -> tuple[boards.Ride, NDArray, NDArray]:
+        own = self.sheets
+        return boards.ride_on(own.nodes, own.triangles, own.panel, own.middle)
 
     @property
-    def ride(self) -> Ride:
+    def ride(self) -> boards.Ride:
         """The riding points."""
         return self._riding[0]
 
     @cached_property
     def tables(self) -> Tables:  # pyright: ignore[reportIncompatibleVariableOverride]
         """Contact data as arrays, with boards' points; see `ContactTerm`."""
-        return board_tables(self.sheets, *self._riding, self._guarded.hinges)
+        return boards.board_tables(self.sheets, *self._riding, self._guarded.hinges)
 
     def compiled(self, part: Any, kept: Memory, group: int) -> CompiledTerm:
         """Context and kernels for a thread; see `Term`."""
@@ -65,7 +55,7 @@ class BoardContactTerm(ContactTerm):
     def points(self, q: NDArray) -> NDArray:
         """Displacements of the riding points, followed by the nodes; see `ContactTerm`."""
         out = np.empty_like(self.ride.rest)
-        put_points(Context(self.ride), nodal(q), out)
+        boards.put_points(Context(self.ride), nodal(q), out)
         return out
 
     @property
@@ -75,17 +65,17 @@ class BoardContactTerm(ContactTerm):
 
     def carried(self, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """Points (m,) that depend on the chosen nodes only; see `ContactTerm`."""
-        return carried(self.ride, chosen)
+        return boards.carried(self.ride, chosen)
 
     def on_nodes(self, q: NDArray, force: NDArray) -> NDArray:
         """Nodal forces that are equivalent to forces on the points; see `ContactTerm`."""
         out = np.zeros_like(self.ride.x)
-        add_back(Context(self.ride), nodal(q), force, out)
+        boards.add_back(Context(self.ride), nodal(q), force, out)
         return out
 
     def step_back(self, u0: NDArray, u1: NDArray, force: NDArray) -> NDArray:
         """Nodal forces that do the work of the points' forces in a step; see `ContactTerm`."""
-        motion = step_jacobian(self.ride, u0, u1, self.ride.x.size)
+        motion = boards.step_jacobian(self.ride, u0, u1, self.ride.x.size)
         return (motion.T @ force.ravel()).reshape(-1, 3)
 
     def step_tangent(
@@ -93,8 +83,8 @@ class BoardContactTerm(ContactTerm):
     ) -> sparse.csr_array:
         """Step tangent with respect to nodes; takes the points' motion to first order."""
         ride, size = self.ride, u0.size
-        motion, ahead = step_jacobian(ride, u0, u1, size), jacobian(ride, u1, size)
-        bent = curvature(ride, 0.5 * (u0 + u1), force, size)
+        motion, ahead = boards.step_jacobian(ride, u0, u1, size), boards.jacobian(ride, u1, size)
+        bent = boards.curvature(ride, 0.5 * (u0 + u1), force, size)
         return sparse.csr_array(motion.T @ inner @ ahead + 0.5 * bent)
 
     def tangent_at(self, q: NDArray, kept: Memory) -> sparse.csr_array:
@@ -103,14 +93,14 @@ class BoardContactTerm(ContactTerm):
         add_contact(
             Context(tables), kept.x - tables.rest, self._guarded.angles(q), push, Context(kept)
         )
-        motion = jacobian(self.ride, nodal(q), q.size)
+        motion = boards.jacobian(self.ride, nodal(q), q.size)
         inner = contact_tangent(tables, kept, push.size)
-        bent = curvature(self.ride, nodal(q), push, q.size)
+        bent = boards.curvature(self.ride, nodal(q), push, q.size)
         return sparse.csr_array(motion.T @ inner @ motion + bent)
 
     def holds(self, q: NDArray) -> sparse.csr_array:
         """Unit rows (s, m) of the term's internal constraints; see `Term`."""
-        rows = self.held(q, self.ride.rest.size) @ jacobian(self.ride, nodal(q), q.size)
+        rows = self.held(q, self.ride.rest.size) @ boards.jacobian(self.ride, nodal(q), q.size)
         size = np.sqrt(np.asarray(rows.multiply(rows).sum(axis=1)).ravel())
         return sparse.csr_array(sparse.diags_array(1.0 / size) @ rows)
 
@@ -119,7 +109,7 @@ class BoardContactTerm(ContactTerm):
     ) -> float:
         """Share of a step without crossing, found in pieces in which points hardly turn."""
         u, motion = nodal(q), nodal(step)
-        turn = largest_turn(self.ride, u, motion)
+        turn = boards.largest_turn(self.ride, u, motion)
         if not turn < math.inf:
             return 0.0
         pieces = max(1, math.ceil(turn / STRAIGHT))

@@ -252,11 +252,10 @@ def _motion(ride: Ride, turned: NDArray, size: int) -> sparse.csr_array:
     blocks += ride.weights[:, :, :, None, None] * np.eye(3)
     n, first = ride.x.size, ride.rest.size - ride.x.size
     pairs = np.broadcast_arrays(ride.points[:, :, None], ride.nodes[:, None, :])
-    rows, columns = places_of(np.stack(pairs, axis=-1).reshape(-1, 2))
-    same = np.arange(n)
+    places = places_of(np.stack(pairs, axis=-1).reshape(-1, 2))
     entries = np.concatenate([blocks.ravel(), np.ones(n)])
-    places = [np.concatenate([rows, first + same]), np.concatenate([columns, same])]
-    return sparse.csr_array(sparse.coo_array((entries, places), shape=(first + n, size)))
+    places = np.hstack([places, [first + np.arange(n), np.arange(n)]])
+    return sparse.csr_array((entries, tuple(places)), (first + n, size))
 
 
 def step_jacobian(ride: Ride, u0: NDArray, u1: NDArray, size: int) -> sparse.csr_array:
@@ -330,10 +329,6 @@ class BoardSheets(Sheets):
     """
 
     middle: NDArray
-
-    def riding(self) -> tuple[Ride, NDArray, NDArray]:
-        """Points at the corners of the boards; see `ride_on`."""
-        return ride_on(self.nodes, self.triangles, self.panel, self.middle)
 
 
 def board_tables(
