@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from foldyn.arguments import Check, Key
 from foldyn.cases.connectors import NEAR, Connector
-from foldyn.cases.decode import Factor, Part
+from foldyn.cases.decode import Factor, Part, Until
 from foldyn.cases.directions import Direction, Pairs
 from foldyn.cases.history import CONSTANT, STEADY, History
 from foldyn.cases.selection import Nodes, refuse_linear, resolve_nodes
@@ -147,6 +147,8 @@ class Spring(Connector, Elastic):
         Factor of time of this change; constant by default. In paths, the load factor instead.
     stiffness_history : History or callable, optional
         Factor of time of k, for motions; constant by default.
+    until : float, optional
+        Time (s), above 0, at which a motion releases the springs; see `Fix`.
     """
 
     stiffness: Annotated[float, Check(number, above=0.0, unit="N/m")]
@@ -157,6 +159,7 @@ class Spring(Connector, Elastic):
     change: Annotated[float, Check(number, unit="m"), Key("rest_change")] = 0.0
     history: Factor = STEADY
     stiffness_history: Factor = STEADY
+    until: Until = None
 
     missing = {"stiffness": "give it (N/m) for springs, or dashpot (N s/m)"}
     apart = "springs are a support of their own"
@@ -213,6 +216,8 @@ class Bar(Elastic):
     bending : float, optional
         EI (N m2) about the weakest axis. With it, paths and motions warn where a bar is pressed
         with more than its buckling load, pi^2 EI / L^2 (Euler).
+    until : float, optional
+        Time (s), above 0, at which a motion releases the bars; see `Fix`.
     """
 
     between: Annotated[Pairs, Key("bar")]
@@ -223,6 +228,7 @@ class Bar(Elastic):
     bending: Annotated[float | None, Check(number, above=0.0, unit="N m2"), Key("bar_bending")] = (
         None
     )
+    until: Until = None
 
     missing = {"bar_stiffness": "give EA (N) of the bars"}
     apart = "bars are a support of their own"
@@ -291,6 +297,8 @@ class Cable(Elastic):
         Change of l0 (m) at factor 1 of the history: negative to wind the cable in.
     history : History or callable, optional
         Factor of time of this change; constant by default. In paths, the load factor instead.
+    until : float, optional
+        Time (s), above 0, at which a motion releases the cable; see `Fix`.
 
     Notes
     -----
@@ -305,6 +313,7 @@ class Cable(Elastic):
     pretension: Annotated[float | None, Check(number, least=0.0, unit="N")] = None
     change: Annotated[float, Check(number, unit="m"), Key("cable_change")] = 0.0
     history: Factor = STEADY
+    until: Until = None
 
     missing = {"cable_stiffness": "give EA (N) of the cable"}
     apart = "a cable is a support of its own"

@@ -15,6 +15,7 @@ from scipy import sparse
 from foldyn.cases import Case, Continuation, State
 from foldyn.cases.air import refuse_wind
 from foldyn.cases.constraints import AGREES
+from foldyn.cases.releases import refuse_releases
 from foldyn.cases.springs import refuse_driven
 from foldyn.dynamics import timing
 from foldyn.dynamics.audit import audited, energy_error
@@ -86,6 +87,8 @@ def _refuse_nonlinear(case: Case) -> None:
             "air",
         )
     refuse_driven(case, "motions of superelements")
+    bars = "leave it out, or take bars and hinges, or a shell"
+    refuse_releases(case, "a motion of superelements", bars)
     if case.remembering:
         raise InputError(
             f": {case.remembering[0].law.name} has memory, which motions of superelements leave "
