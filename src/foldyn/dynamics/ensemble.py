@@ -14,7 +14,7 @@ from numba import config
 from numpy.typing import NDArray
 
 from foldyn.cases import Case, Origin, State
-from foldyn.cases.releases import SIMULATE, refuse_releases
+from foldyn.cases.releases import refuse_releases
 from foldyn.dynamics import timing
 from foldyn.dynamics.driver import prepare
 from foldyn.dynamics.gpu.choice import DEVICES, choose
@@ -24,15 +24,7 @@ from foldyn.dynamics.motion import Motion
 from foldyn.dynamics.motion_state import Samples
 from foldyn.dynamics.sampling import Sampler
 from foldyn.dynamics.stability import damper_rate, frequency_bound, is_stable
-from foldyn.errors import (
-    ComputationError,
-    InputError,
-    StretchWarning,
-    listed,
-    told_once,
-    warn,
-    within,
-)
+from foldyn.errors import ComputationError, InputError, StretchWarning, listed, told_once, warn
 from foldyn.materials.inelastic_law import VARIABLES
 from foldyn.mechanics.lanes import WIDTH
 from foldyn.results.dataset import origin_variables, result_dataset
@@ -121,11 +113,11 @@ def simulate_many(
     with told_once() as told:
         for k, (case, state) in enumerate(zip(cases, states, strict=True)):
             told.where = f"cases[{k}]"
-            with within(f"cases[{k}]."):
-                refuse_releases(of_kind("case", case, Case), "fd.simulate_many", SIMULATE)
+            of_kind(f"cases[{k}]", case, Case)
             like = next((m for m in motions[:1] if dt is not None and _takes_starts(m, case)), None)
             asked = "gpu" if device == "gpu" else "cpu"
             try:
+                refuse_releases(case, "fd.simulate_many")
                 given = case, duration, method, dt, every_steps, interval, state
                 motions.append(
                     _from_start(like, state) if like
