@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
-from typing import Any
+from functools import cached_property, partial
+from typing import Any, cast
 
 import numpy as np
 import xarray
@@ -25,19 +25,14 @@ from foldyn.results.attributes import OWN
 from foldyn.results.crossings import crossings_of
 from foldyn.results.dataset import AXIS, result_dataset, stage_times
 from foldyn.results.quantities import ORIGIN, energies_of, variable
+from foldyn.values import number
 
 SAME = 1e-9  # share of a step or an interval by which times may differ
 _, DISSIPATED, WORK = AUDITED
 SINCE = (DISSIPATED, WORK, AIR)  # energies that count from the start of a motion
-TOGETHER: Mapping[Callable[[Any], Any], tuple[str, ...]] = {
-    sum: (
-        "steps", "wall_seconds", "force_evaluations", "refused_steps", "halved_steps",
-        "iterations", "factorizations", "contact_lists", "flows", "flow_energy",
-    ),
-    min: ("critical_step", "smallest_step", "shortest_contact_step"),
-    max: ("largest_step", "threads"),
-}  # fmt: skip
-"""How attributes of the parts make one of the whole; the others are those of the first part."""
+SUMMED = ("wall_seconds", "flow_energy")  # attributes that add up, besides whole numbers
+LEAST = ("critical_step", "smallest_step", "shortest_contact_step")
+MOST = ("largest_step", "threads")
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +67,12 @@ class ReleasedMotion(InMemory):
 
     kind = "a motion with releases"
 
-    def part(self, k: int, state: State | None) -> Motion:
+    @cached_property
+    def first(self) -> Motion:
+        """The first part."""
+        return self._part(0, self.initial)
+
+    def _part(self, k: int, state: State | None) -> Motion:
         """Part number k, from a state."""
         now, length = self.times[k], self.times[k + 1] - self.times[k]
         dt = self.longest
@@ -86,28 +86,33 @@ class ReleasedMotion(InMemory):
     @property
     def method(self) -> Any:
         """The first method, under another name: kernels of GPUs for many motions lack releases."""
-        return replace(self.part(0, self.initial).method, name=self.kind)
+        return replace(self.first.method, name=self.kind)
 
     @property
     def expected_samples(self) -> int:
         """Number of samples, about, if samples are counted in steps."""
-        spacing = self.interval or self.every * self.part(0, self.initial).plan.dt
+        spacing = self.interval or self.every * self.first.plan.dt
         return 1 + round((self.times[-1] - self.times[0]) / spacing)
 
     def _computed(self, report: Reporter) -> xarray.Dataset:
         parts: list[xarray.Dataset] = []
         with told_once():
             for k, now in enumerate(self.times[:-1]):
-                state = initial_state(parts[-1]) if parts else self.initial
-                if parts and now in release_times(self.case):  # the forces change
-                    state = replace(state, continuation=None)
+                motion = self._next(k, parts[-1]) if parts else self.first
                 try:
-                    parts.append(self.part(k, state).run(partial(self._tell, report, now)))
+                    parts.append(motion.run(partial(self._tell, report, now)))
                 except (ComputationError, MotionInterrupted) as error:
                     if error.partial is not None and error.partial.sizes["time"]:
                         error.partial = self._joined([*parts, error.partial])
                     raise
         return self._joined(parts)
+
+    def _next(self, k: int, before: xarray.Dataset) -> Motion:
+        """Part number k, which goes on from the part before."""
+        state = initial_state(before)
+        if self.times[k] in release_times(self.case):  # forces change: methods start afresh
+            state = replace(state, continuation=None)
+        return self._part(k, state)
 
     def _tell(self, report: Reporter, now: float, own: Progress) -> None:
         start, end = self.times[0], self.times[-1]
@@ -129,15 +134,15 @@ class ReleasedMotion(InMemory):
         even = np.abs(steps - np.round(steps)) < SAME * len(steps)
         whole = whole.isel(time=even if self.interval else slice(None, None, self.every))
         attributes = [part.attrs for part in parts]
-        facts = {key: own for key, own in attributes[0].items() if key not in (*OWN, "every_steps")}
-        for gather, keys in TOGETHER.items():
-            given = {key: [own[key] for own in attributes if key in own] for key in keys}
-            facts |= {key: gather(values) for key, values in given.items() if values}
+        facts = {
+            key: _together(key, [own[key] for own in attributes if key in own])
+            for key in attributes[0]
+            if key not in (*OWN, "every_steps")
+        }
         energy = np.stack([whole[name] for name in names], axis=1)
         scale, off = energy_scale(energy, case.air is not None), energy_error(energy)
         facts |= {"interval": self.interval} if self.interval else {"every_steps": self.every}
         facts |= {
-            "method": ", ".join(dict.fromkeys(own["method"] for own in attributes)),
             "duration": self.times[-1] - self.times[0],
             "dt": (self.times[-1] - self.times[0]) / max(1, facts["steps"]),
             "energy_error": float(np.abs(off).max()) / scale if scale else 0.0,
@@ -148,7 +153,7 @@ class ReleasedMotion(InMemory):
         data = {name: (own.dims, own.values, own.attrs) for name, own in {**ends, **whole}.items()}
         along = {"time": ("time", whole["time"].values, first["time"].attrs)}
         result = result_dataset("trajectory", case, data, along, facts, stage_times(facts))
-        stride = -(-len(steps) // max(1, sum(own["crossing_looks"] for own in attributes)))
+        stride = -(-len(steps) // max(1, facts["crossing_looks"]))
         return crossings_of(case, whole["displacement"].values, stride).recorded(result)
 
     def _placed(self, part: xarray.Dataset, now: float) -> xarray.Dataset:
@@ -167,13 +172,22 @@ class ReleasedMotion(InMemory):
             if name == "tension":  # also of springs, where no bar or cable is left
                 acts = [stays(support, now) for support, *_ in case.polylines()]
                 states = [own[name].values for name in ("displacement", "velocity", "time")]
-                pulls = [one.function(*state) for state in zip(*states, strict=True)]
+                pulls = [cast(Any, one.function)(*state) for state in zip(*states, strict=True)]
                 own = own.drop_dims("line", errors="ignore")
                 own[name] = variable(dims, np.array(pulls) * acts, one.units, one.text)
             elif name not in own:
                 zero = np.zeros([sizes[dim] for dim in dims])
                 own[name] = variable(dims, zero, one.units, one.text)
         return own
+
+
+def _together(key: str, values: Sequence[Any]) -> Any:
+    """An attribute of the whole, from those of the parts."""
+    if key == "method":
+        return ", ".join(dict.fromkeys(values))
+    if key in LEAST or key in MOST:
+        return min(values) if key in LEAST else max(values)
+    return sum(values) if key in SUMMED or isinstance(values[0], int) else values[0]
 
 
 def _go_on(own: xarray.Dataset, before: xarray.Dataset, names: Sequence[str]) -> None:
@@ -204,6 +218,11 @@ def prepare_released(
             if abs(steps - round(steps)) > SAME:
                 times |= {start + whole * span for whole in (math.floor(steps), math.ceil(steps))}
             times.add(time)
-    times = tuple(sorted(times))
+    dt = None if dt is None else number("dt", dt, above=0.0)
     own = partial(prepare, **given)
-    return ReleasedMotion(case, own, times, span, every, dt, initial)
+    motion = ReleasedMotion(case, own, tuple(sorted(times)), span, every, dt, initial)
+    _ = motion.first  # refuses what is wrong before anything is computed
+    timing.check_samples(
+        motion.expected_samples, len(case.structure.nodes), len(case.reaction_dofs)
+    )
+    return motion
