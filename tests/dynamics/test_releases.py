@@ -5,6 +5,7 @@ import pytest
 
 import foldyn as fd
 from foldyn.dynamics import METHODS
+from foldyn.errors import ComputationError, InputError
 
 G = 9.81
 PANEL = fd.Pattern([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], [(0, 1, 2, 3)])
@@ -37,11 +38,17 @@ def same(one, other, names=("displacement", "velocity"), tolerance=1e-12):
 
 
 # ---------------------------------------------------------------------- closed forms
+def center(values):
+    """Values (nt,) of the center of mass of a panel, from those of its nodes (nt, n)."""
+    return values @ PLATE.nodal_mass / PLATE.nodal_mass.sum()
+
+
 def hanging(until):
     """A panel on a spring (N/m) at each corner, which turns up and down at 4 rad/s."""
     nodal = PLATE.nodal_mass
     springs = [
-        fd.Spring(16.0 * nodal[node], nodes=[node], direction="z", until=until) for node in range(4)
+        fd.Spring(16.0 * nodal[node], nodes=[node], direction="z", until=until)
+        for node in range(len(nodal))
     ]
     return fd.Case(PLATE, springs, DOWN)
 
@@ -115,8 +122,8 @@ def test_a_plane_is_removed():
     assert force[on].max() > 0.0 and not force[~on].any()
     assert not motion.contact_force.values[~on].any() and motion.sizes["plane"] == 1
     z = motion.displacement.sel(axis="z").values
-    after, t = z[~on].mean(axis=1), motion.time.values[~on] - 0.1
-    speed = motion.velocity.sel(axis="z").values[~on][0].mean()
+    after, t = center(z)[~on], motion.time.values[~on] - 0.1
+    speed = center(motion.velocity.sel(axis="z").values)[~on][0]
     assert after == pytest.approx(after[0] + speed * t - 0.5 * G * t**2, abs=1e-7)
     assert motion.attrs["energy_error"] < 1e-3
 
@@ -203,23 +210,25 @@ def test_a_release_that_never_comes_changes_nothing():
 @pytest.mark.parametrize("method", ["rk4", "dormand_prince"])
 def test_samples_can_count_steps(method):
     case, _ = released_twice()
-    every = fd.simulate(case, 0.036, method=method)
-    third = fd.simulate(case, 0.036, method=method, every_steps=3)
+    options = {"method": method, "dt": 1e-4}
+    every = fd.simulate(case, 0.036, **options)
+    third = fd.simulate(case, 0.036, every_steps=3, **options)
     assert np.array_equal(third.time.values, every.time.values[::3])
     assert {0.012, 0.024} <= set(every.time.values.tolist())
     assert every.sizes["time"] == every.attrs["steps"] + 1
 
 
 def test_a_base_throws_what_it_lets_go():
-    """The base stops to matter to a panel that it has thrown up with the speed it has then."""
+    """A panel that moves with the base flies on with its speed; the base has nothing to move."""
     base = fd.BaseMotion("z", fd.Ramp(1.0), value=2.0)
-    case = fd.Case(PLATE, [fd.Fix([0, 1, 2, 3], until=0.125), base], DOWN)
-    motion = fd.simulate(case, 0.25, method="rk4", interval=2.0**-5)
-    t = motion.time.values
-    after = np.maximum(0.0, t - 0.125)
-    z = motion.displacement.sel(axis="z").values[:, 1]
-    assert z == pytest.approx(2.0 * t - 0.5 * G * after**2, abs=1e-9)
-    assert motion.attrs["energy_error"] < 1e-9
+    case = fd.Case(PLATE, [fd.Fix([0, 1, 2, 3], until=0.125), base])
+    speed = np.full_like(PLATE.nodes, [0.0, 0.0, 2.0])
+    given = {"initial": fd.State(velocity=speed), "method": "rk4", "interval": 2.0**-5}
+    motion = fd.simulate(case, 0.25, **given)
+    t = motion.time.values[:, None]
+    assert np.abs(motion.displacement.sel(axis="z").values - 2.0 * t).max() < 1e-12
+    assert np.abs(motion.velocity.values - speed).max() < 1e-12
+    assert motion.attrs["energy_error"] < 1e-12 and motion.kinetic.values.min() > 0.0
 
 
 @pytest.mark.parametrize("part", ["link", "impose", "bar"])
@@ -257,7 +266,7 @@ def test_functions_progress_and_failures_see_one_motion():
     assert motion.tip.attrs == {"units": "m", "long_name": "tip"}
     times = [one.time for one in seen]
     assert times == sorted(times) and times[-1] == pytest.approx(0.036) == seen[0].duration
-    with pytest.raises(fd.ComputationError, match="enough") as caught:
+    with pytest.raises(ComputationError, match="enough") as caught:
         fd.simulate(case, 0.036, sample={"tip": fails}, **options)
     partial = caught.value.partial
     same(partial, motion.isel(time=slice(0, partial.sizes["time"])))
@@ -278,16 +287,16 @@ def test_a_stored_motion_runs_again(tmp_path):
 
 CASE = """
 [pattern]
-generator = "simple_fold"
+kind = "simple_fold"
 dihedral = 60
 
 [sheet]
-modulus = 1e6
-poisson = 0.25
+youngs_modulus = 1e6
+poissons_ratio = 0.25
 thickness = 0.01
 density = 1.0
 
-[structure]
+[model]
 preset = "plate"
 
 [[supports]]
@@ -329,15 +338,15 @@ def test_a_case_file_releases(tmp_path):
 # ---------------------------------------------------------------------- refusals
 @pytest.mark.parametrize("until", [0.0, -1.0])
 def test_releases_come_after_the_start(until):
-    with pytest.raises(fd.InputError, match="until"):
+    with pytest.raises(InputError, match="until"):
         fd.Fix([0], until=until)
 
 
 def test_loads_may_act_on_what_is_free_in_the_end():
     payload = fd.Force([2], (0.0, 0.0, -1.0))
     fd.Case(FLAP, [*HINGED, fd.Fix(TIP, until=1.0)], [payload])
-    with pytest.raises(fd.InputError, match="held"):
-        fd.Case(FLAP, [*HINGED, fd.Fix(TIP), fd.Cable([2, (0, 0, 3)], 1.0, until=1.0)], [payload])
+    with pytest.raises(InputError, match="supports hold"):
+        fd.Case(FLAP, [*HINGED, fd.Fix(TIP), fd.Cable([2, (0, 0, 1)], 1.0, until=1.0)], [payload])
 
 
 def refused():
@@ -359,14 +368,15 @@ def refused():
 
 @pytest.mark.parametrize("name", list(refused()))
 def test_what_has_no_releases_says_so(name):
-    with pytest.raises(fd.InputError, match=r"until = .*releases nothing"):
+    with pytest.raises(InputError, match=r"until = .*releases nothing"):
         refused()[name]()
 
 
-def test_modes_are_those_before():
-    case, by_hand = released_twice()
-    held = case.altered(supports=[*HINGED, fd.Fix([3])])
-    free = case.altered(supports=[*HINGED, fd.Fix([3], until=1.0)])
-    for state in (None, "loads"):
-        one, other = (fd.modes(each, 3, state=state).frequency for each in (held, free))
-        assert np.array_equal(one, other)
+@pytest.mark.parametrize("state", [None, "equilibrium"])
+def test_modes_are_those_before(state):
+    loads = [] if state is None else DOWN
+    held, free = (
+        fd.Case(FLAP, [*HINGED, fd.Fix([3], until=until)], loads) for until in (None, 1.0)
+    )
+    one, other = (fd.modes(each, 3, state=state).frequency for each in (held, free))
+    assert np.array_equal(one, other)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -152,8 +151,8 @@ class Case(Loaded, Damped):
         _ = self.base_terms, self.actuation_terms  # check the supports and the creases
         if self.constraints:
             _ = self.imposed_terms
-        if release_times(self):
-            _ = released(self, math.inf)  # loads need to move only what is free in the end
+        if times := release_times(self):
+            _ = released(self, times[-1])  # loads need to move only what is free in the end
             return
         for place, load in self._loads():
             if not (self.structure.linear and self._acts_between(load, place)):

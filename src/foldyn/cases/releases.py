@@ -70,7 +70,9 @@ def released(case: Any, time: float) -> Any:
 
 def unreleased(case: Any) -> Any:
     """A case whose parts all stay, for analyses of the state before anything is released."""
-    return _changed(case, lambda part: part if stays(part, math.inf) else replace(part, until=None))
+    return _changed(
+        case, lambda part: replace(part, until=None) if _until(part) < math.inf else part
+    )
 
 
 def refuse_releases(
