@@ -128,6 +128,17 @@ def test_a_plane_is_removed():
     assert motion.attrs["energy_error"] < 1e-3
 
 
+def test_a_panel_falls_from_plane_to_plane():
+    planes = [fd.Plane((0, 0, -z), (0, 0, 1), until=t) for z, t in ((0.0047, 0.03), (0.02, None))]
+    case = fd.Case(PLATE, (), DOWN, contact=fd.Contact(panels=False, stiffness=1e3, planes=planes))
+    motion = fd.simulate(case, 0.1, method="dormand_prince", interval=0.002)
+    upper, lower = motion.plane_force.values[:, :, 2].T
+    z, on = motion.displacement.sel(axis="z").values, motion.time.values < 0.03 - 1e-9
+    assert upper[on].max() > 0.0 and not upper[~on].any() and not lower[on].any()
+    assert lower.max() > 0.0 and z.min() > -0.02
+    assert motion.attrs["energy_error"] < 1e-3
+
+
 # ---------------------------------------------------------------------- as by hand
 @pytest.mark.parametrize(
     "method",
@@ -248,6 +259,23 @@ def test_other_supports_are_released(part):
     same(motion.isel(time=slice(5, None)), alone)
     off, scale = imbalance(motion, case)
     assert off < 1e-4 * scale
+
+
+def test_an_edge_held_along_its_length_is_let_go():
+    """Its dofs between vertices are fewer while it is held."""
+    steel = fd.Sheet(2e11, 0.3, 1e-3, 7850.0)
+    sheet = fd.discretize(
+        fd.patterns.simple_fold(a=0.1, b=0.1, dihedral=60), steel, preset="n5b8e", straight="xmin"
+    )
+    case = fd.Case(sheet, [fd.Fix([4, 5]), fd.Fix([0, 1], until=1e-4, along=True)], DOWN)
+    motion = fd.simulate(case, 2e-4, method="rk4", interval=2e-5)
+    begin = fd.initial_state(motion, 5)
+    alone = fd.simulate(
+        fd.Case(sheet, case.supports[:1], DOWN), 1e-4, start=1e-4, method="rk4", interval=2e-5,
+        initial=fd.State(begin.displacement, begin.velocity),
+    )  # fmt: skip
+    same(motion.isel(time=slice(5, None)), alone)
+    assert motion.attrs["energy_error"] < 1e-2
 
 
 def test_functions_progress_and_failures_see_one_motion():
