@@ -6,6 +6,7 @@ import pytest
 import foldyn as fd
 from foldyn.dynamics import METHODS
 from foldyn.errors import ComputationError, InputError
+from foldyn.gradients.motion import MotionGradient
 
 G = 9.81
 PANEL = fd.Pattern([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], [(0, 1, 2, 3)])
@@ -390,6 +391,8 @@ def refused():
         "superelements": lambda: fd.simulate(linear, 2.0),
         "random": lambda: fd.random_response(case, base={"x": noise}),
         "periodic": lambda: fd.periodic_motion(driven, 0.2),
+        "gradients": lambda: MotionGradient(case, {"duration": 0.01, "method": "rk4"}),
+        "basins": lambda: fd.basins(driven, lambda x: fd.State(), grid={"x": [0.0]}, duration=1.0),
         "lyapunov": lambda: fd.lyapunov_exponent(driven, 1.0, interval=0.1),
     }
 

@@ -173,7 +173,7 @@ class ReleasedMotion(InMemory):
                 acts = [stays(support, now) for support, *_ in case.polylines()]
                 states = [own[name].values for name in ("displacement", "velocity", "time")]
                 pulls = [cast(Any, one.function)(*state) for state in zip(*states, strict=True)]
-                own = own.drop_dims("line", errors="ignore")
+                own = own.drop_vars(name, errors="ignore")
                 own[name] = variable(dims, np.array(pulls) * acts, one.units, one.text)
             elif name not in own:
                 zero = np.zeros([sizes[dim] for dim in dims])
