@@ -50,6 +50,8 @@ class ReleasedMotion(InMemory):
         Prepares a part; see `driver.prepare`.
     times : tuple of float
         The start, and the end of each part (s).
+    between : frozenset of float
+        Releases between samples (s).
     interval, every : float, int
         Time between samples (s), or 0 and the number of steps between samples.
     longest : float, optional
@@ -60,6 +62,7 @@ class ReleasedMotion(InMemory):
     case: Case
     prepare: Callable[..., Motion]
     times: tuple[float, ...]
+    between: frozenset[float]
     interval: float
     every: int
     longest: float | None
@@ -128,11 +131,12 @@ class ReleasedMotion(InMemory):
             if pieces:
                 _go_on(own, pieces[-1], names)
             pieces.append(own)
-        rows = [*(own.isel(time=slice(-1)) for own in pieces[:-1]), pieces[-1]]
+        rows = [
+            own.isel(time=slice(int(now in self.between), None if own is pieces[-1] else -1))
+            for own, now in zip(pieces, self.times, strict=False)
+        ]
         whole = xarray.concat(rows, "time").drop_vars(["support", "plane"], errors="ignore")
-        steps = (whole["time"].values - self.times[0]) / (self.interval or 1.0)
-        even = np.abs(steps - np.round(steps)) < SAME * len(steps)
-        whole = whole.isel(time=even if self.interval else slice(None, None, self.every))
+        whole = whole.isel(time=slice(None, None, self.every or 1))
         attributes = [part.attrs for part in parts]
         facts = {
             key: _together(key, [own[key] for own in attributes if key in own])
@@ -153,7 +157,7 @@ class ReleasedMotion(InMemory):
         data = {name: (own.dims, own.values, own.attrs) for name, own in {**ends, **whole}.items()}
         along = {"time": ("time", whole["time"].values, first["time"].attrs)}
         result = result_dataset("trajectory", case, data, along, facts, stage_times(facts))
-        stride = -(-len(steps) // max(1, facts["crossing_looks"]))
+        stride = -(-whole.sizes["time"] // max(1, facts["crossing_looks"]))
         return crossings_of(case, whole["displacement"].values, stride).recorded(result)
 
     def _placed(self, part: xarray.Dataset, now: float) -> xarray.Dataset:
@@ -211,16 +215,16 @@ def prepare_released(
     every, span = timing.sampling(duration, every_steps, interval)
     count = math.floor(duration / span * (1.0 + 1e-12) + SAME) if span else 1
     end = start + count * (span or duration)
-    times = {start, end}
-    for time in release_times(case):
-        if start < time < end:
-            steps = (time - start) / (span or math.inf)
-            if abs(steps - round(steps)) > SAME:
-                times |= {start + whole * span for whole in (math.floor(steps), math.ceil(steps))}
-            times.add(time)
+    within = {time: (time - start) / (span or math.inf) for time in release_times(case)}
+    within = {time: steps for time, steps in within.items() if start < time < end}
+    off = {time: steps for time, steps in within.items() if abs(steps - round(steps)) > SAME}
+    beside = {
+        start + near(steps) * span for steps in off.values() for near in (math.floor, math.ceil)
+    }
+    times = tuple(sorted({start, end, *within, *beside}))
     dt = None if dt is None else number("dt", dt, above=0.0)
     own = partial(prepare, **given)
-    motion = ReleasedMotion(case, own, tuple(sorted(times)), span, every, dt, initial)
+    motion = ReleasedMotion(case, own, times, frozenset(off), span, every, dt, initial)
     _ = motion.first  # refuses what is wrong before anything is computed
     timing.check_samples(
         motion.expected_samples, len(case.structure.nodes), len(case.reaction_dofs)
