@@ -85,7 +85,7 @@ DATA: Calls = {
         "width": 0.25, "thickness": 0.5, "youngs_modulus": 1e6, "poissons_ratio": 0.25,
     }),
     "Laminate": (fd.Laminate, {"layers": [(0.5, 1e9, 0.125), (0.25, 2e9, 0.25)]}),
-    "Fix": (fd.Fix, {"nodes": [0, 1], "axes": "xy", "along": False}),
+    "Fix": (fd.Fix, {"nodes": [0, 1], "axes": "xy", "along": False, "until": 0.5}),
     "Impose": (fd.Impose, {
         "nodes": [0, 1], "axis": "x", "value": [0.5, 0.25], "along": False,
     }),
@@ -99,6 +99,7 @@ DATA: Calls = {
     "Cable": (fd.Cable, {
         "nodes": [0, 1, (0.5, 0.25, 1.0)], "stiffness": 2.0, "pretension": 0.5, "change": 0.25,
         "friction": 0.5, "sliding_speed": 0.25,
+        "until": 0.5,
     }),
     "Dashpot": (fd.Dashpot, {"coefficient": 2.0, "nodes": 0, "direction": (1.0, 0.0, 0.0)}),
     "Stop": (fd.Stop, {"creases": [0], "angle": 30.0, "stiffness": 2.0, "side": "below",
@@ -129,7 +130,7 @@ DATA: Calls = {
     }),
     "Plane": (fd.Plane, {
         "point": (0.0, 0.5, 0.0), "normal": (0.0, 0.0, 1.0), "friction": 0.5,
-        "motion": (0.0, 0.5, 1.0), "history": fd.Ramp(1.0),
+        "motion": (0.0, 0.5, 1.0), "history": fd.Ramp(1.0), "until": 0.5,
     }),
     "Air": (fd.Air, {
         "density": 998.0, "velocity": (0.5, 0.0, 0.0), "added_mass": "local", "drag": True,

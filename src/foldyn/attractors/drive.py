@@ -10,6 +10,7 @@ import numpy as np
 
 from foldyn import cases
 from foldyn.cases import Case, Constant, Harmonic, History, as_history
+from foldyn.cases.releases import refuse_releases
 from foldyn.cases.springs import refuse_varying
 from foldyn.errors import InputError
 
@@ -70,6 +71,7 @@ def driven_frequency(case: Case, name: str) -> float:
 def check_harmonic(case: Case, name: str) -> None:
     """Refuse histories that are neither harmonic nor constant, and stiffness that varies."""
     refuse_varying(case)
+    refuse_releases(case, name)
     for place, part in _parts(case):
         history = as_history(getattr(part, "history", None))
         if not isinstance(history, Constant | Harmonic):

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.cases import Case, State
+from foldyn.cases.releases import refuse_releases
 from foldyn.dynamics import METHODS, prepare
 from foldyn.dynamics.methods import suited, suiting
 from foldyn.dynamics.modal_damping import modal_rows
@@ -93,7 +94,8 @@ def divisor(interval: float, dt: float) -> float:
 
 
 def check_relaxing(case: Case, why: str) -> None:
-    """Refuse hinges that yield or creep, for a reason."""
+    """Refuse hinges that yield or creep, for a reason, and releases."""
+    refuse_releases(case, "this analysis")
     if not all(part.law.relaxes for part in case.remembering):
         raise InputError(
             f"structure: some of its hinges yield, creep or have latches, and {why}; take prony or "

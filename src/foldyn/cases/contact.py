@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.arguments import Check, Flag, Read
-from foldyn.cases.decode import Factor, Part, PartOf
+from foldyn.cases.decode import Factor, Part, PartOf, Until
 from foldyn.cases.history import as_history
 from foldyn.errors import InputError
 from foldyn.mechanics.contact.boards import BoardSheets
@@ -50,6 +50,8 @@ class Plane(Part):
         multiplied by the load factor.
     history : History or callable, optional
         Factor of the motion over time; constant by default.
+    until : float, optional
+        Time (s), above 0, at which a motion removes the plane; see `Fix`.
 
     Examples
     --------
@@ -63,6 +65,7 @@ class Plane(Part):
     friction: Annotated[float | None, Check(number, least=0.0)] = None
     motion: Annotated[Sequence[float] | None, Check(vector, unit="m")] = None
     history: Factor = None
+    until: Until = None
 
     missing = {"normal": "give its normal, on the side of the sheet"}
 

@@ -22,7 +22,7 @@ from foldyn.json_schema import Schema, any_of, of_call
 from foldyn.mechanics.term import Term
 from foldyn.structures.discretized import Discretized
 from foldyn.tables import check_keys, check_table, needs, read, schema_of
-from foldyn.values import choice, plain, show
+from foldyn.values import choice, number, plain, show
 
 signature = cache(inspect.signature)
 
@@ -161,6 +161,10 @@ Factor = Annotated[
     Check(lambda _, history: as_history(history)),
     Read(KindOf(history_from, HISTORIES, named=False)),
 ]
+
+
+Until = Annotated[float | None, Check(number, above=0.0, unit="s")]
+"""Time at which a part of a case is released; see `releases`."""
 
 
 class Part(Checked):

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from foldyn.arguments import Check, Key
 from foldyn.cases.connectors import NEAR, Connector
-from foldyn.cases.decode import Factor, Part
+from foldyn.cases.decode import Factor, Part, Until
 from foldyn.cases.directions import Direction, Pairs
 from foldyn.cases.history import CONSTANT, STEADY, History
 from foldyn.cases.selection import Nodes, refuse_linear, resolve_nodes
@@ -148,6 +148,8 @@ class Spring(Connector, Elastic):
         Factor of time of this change; constant by default. In paths, the load factor instead.
     stiffness_history : History or callable, optional
         Factor of time of k, for motions; constant by default.
+    until : float, optional
+        Time (s), above 0, at which a motion releases the springs; see `Fix`.
     """
 
     stiffness: Annotated[float, Check(number, above=0.0, unit="N/m")]
@@ -158,6 +160,7 @@ class Spring(Connector, Elastic):
     change: Annotated[float, Check(number, unit="m"), Key("rest_change")] = 0.0
     history: Factor = STEADY
     stiffness_history: Factor = STEADY
+    until: Until = None
 
     missing = {"stiffness": "give it (N/m) for springs, or dashpot (N s/m)"}
     apart = "springs are a support of their own"
@@ -216,6 +219,8 @@ class Bar(Elastic):
         with more than its buckling load, pi^2 EI / L^2 (Euler).
     mass : float
         Mass (kg) of each bar, spread evenly along it: m/6 [2 1; 1 2] at its ends.
+    until : float, optional
+        Time (s), above 0, at which a motion releases the bars; see `Fix`.
     """
 
     between: Annotated[Pairs, Key("bar")]
@@ -227,6 +232,7 @@ class Bar(Elastic):
         None
     )
     mass: Annotated[float, Check(number, least=0.0, unit="kg"), Key("bar_mass")] = 0.0
+    until: Until = None
 
     missing = {"bar_stiffness": "give EA (N) of the bars"}
     apart = "bars are a support of their own"
@@ -300,6 +306,8 @@ class Cable(Elastic):
         cable slides and turns by the angle a, the tensions are in the ratio exp(mu a).
     sliding_speed : float
         Speed (m/s) below which friction fades, above 0: much below it, the cable creeps.
+    until : float, optional
+        Time (s), above 0, at which a motion releases the cable; see `Fix`.
 
     Notes
     -----
@@ -320,6 +328,7 @@ class Cable(Elastic):
     sliding_speed: Annotated[
         float, Check(number, above=0.0, unit="m/s"), Key("cable_sliding_speed")
     ] = 1e-3
+    until: Until = None
 
     missing = {"cable_stiffness": "give EA (N) of the cable"}
     apart = "a cable is a support of its own"

@@ -10,7 +10,7 @@ import numpy as np
 
 from foldyn.arguments import Check, Flag, Key
 from foldyn.cases.connectors import Dashpot
-from foldyn.cases.decode import Factor, Part, PartOf
+from foldyn.cases.decode import Factor, Part, PartOf, Until
 from foldyn.cases.directions import AXES, Axes, Axis, Direction
 from foldyn.cases.history import STEADY
 from foldyn.cases.latches import Latch
@@ -37,12 +37,16 @@ class Fix(Part):
     along : bool
         Whether to hold also the edges between these nodes, along their whole length. If edges of
         bars and hinges may bow, the held edges must be among the edges `straight` of `discretize`.
+    until : float, optional
+        Time (s), above 0, at which a motion lets the nodes go, counted as by histories. Analyses
+        without time take the nodes as held.
     """
 
     nodes: Nodes
     axes: Axes | None = None
     direction: Direction | None = None
     along: Flag = False
+    until: Until = None
 
     apart = 'holds nodes at rest, and axis = "x", say, moves them'
 
@@ -81,6 +85,8 @@ class Impose(Part):
     along : bool
         Whether to move also the edges between these nodes, each like the straight line between its
         ends; see `Fix`.
+    until : float, optional
+        Time (s), above 0, at which a motion releases the nodes; see `Fix`.
     """
 
     nodes: Nodes
@@ -93,6 +99,7 @@ class Impose(Part):
     history: Factor = STEADY
     direction: Direction | None = None
     along: Flag = False
+    until: Until = None
 
     missing = {"displacement": "give it (m), or write axes instead of axis to hold nodes"}
     apart = "moves nodes"
@@ -163,11 +170,14 @@ class Link(Part):
         Instead of axes: three nodes that span a plate. `nodes` must lie in its plane and move as
         points of it: u = w1 u1 + w2 u2 + w3 u3, with the weights that hold for positions at rest.
         This is exact for any motion of a plate that stays flat.
+    until : float, optional
+        Time (s), above 0, at which a motion releases the nodes; see `Fix`.
     """
 
     nodes: Nodes
     axes: Annotated[Axes | None, Key("link")] = None
     to: Annotated[Sequence[int] | None, Check(_corners)] = None
+    until: Until = None
 
     apart = "ties nodes together"
 

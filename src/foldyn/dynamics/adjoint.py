@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
+from foldyn.cases.releases import refuse_releases
 from foldyn.cases.waveforms import evaluate
 from foldyn.dynamics.inertia import substitute
 from foldyn.dynamics.system import carried, scratch
@@ -175,6 +176,7 @@ class Adjoint(ABC):
 
 def refuse(motion: Any) -> None:
     """Refuse motions without an adjoint, with a remedy."""
+    refuse_releases(motion.case, "a motion with gradients")
     packed, system = motion.packed, motion.packed.system
     arrays_of_body(packed.body)  # refuses terms without gradients
     lacks = {

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from foldyn.algebra.solvers import check_fill
 from foldyn.cases import Case, Dashpot, Rayleigh, State
+from foldyn.cases.releases import release_times
 from foldyn.dynamics import generalized_alpha, timing
 from foldyn.dynamics.checkpoint import SECONDS, check_keeping
 from foldyn.dynamics.gpu.checks import check_gpu, check_taken
@@ -32,6 +33,7 @@ from foldyn.dynamics.modal_damping import modal_rows
 from foldyn.dynamics.motion import Motion
 from foldyn.dynamics.motion_state import StepPlan
 from foldyn.dynamics.progress import Reporter
+from foldyn.dynamics.releases import ReleasedMotion, prepare_released
 from foldyn.dynamics.sampling import Sampler
 from foldyn.dynamics.system import pack
 from foldyn.errors import InputError, warn
@@ -158,7 +160,8 @@ def simulate(
     matrices, alpha M + beta K0 and modal damping, are constant: K0 and the modes are taken at rest
     or, if the damping has state = "initial", in the state where the motion began: the initial
     displacement or, if `initial` is a sample of a motion, the start of that motion. Dashpots
-    between nodes and damped creases follow the motion.
+    between nodes and damped creases follow the motion. Supports and planes with `until` are
+    released at that time: the motion goes on without them, and what they had stored is dissipated.
     """
     keeping = None if store is None else check_keeping(store, checkpoint, resume)
     if store is None and flag("resume", resume):
@@ -173,8 +176,8 @@ def simulate(
 
 def prepared(
     case: Case, duration: float, method: str = AUTO, **given: Any
-) -> Motion | LinearMotion:
-    """As `prepare`, for linear models, too."""
+) -> Motion | LinearMotion | ReleasedMotion:
+    """As `prepare`, for linear models and motions with releases, too."""
     if of_kind("case", case, Case).structure.linear:
         return prepare_linear(case, duration, method, **given)
     if isinstance(method, str) and method == MODAL:
@@ -183,6 +186,11 @@ def prepared(
             f"{AUTO} or one of {', '.join(METHODS)}",
             "method",
         )
+    duration = number("duration", duration, above=0.0)
+    start = float(number("start", given.get("start", 0.0), unit="s"))
+    if any(time < start + duration for time in release_times(case)):
+        given |= {"method": method, "start": start}
+        return prepare_released(case, duration, prepare, **given)
     return prepare(case, duration, method, **given)
 
 

@@ -14,6 +14,7 @@ from numba import config
 from numpy.typing import NDArray
 
 from foldyn.cases import Case, Origin, State
+from foldyn.cases.releases import refuse_releases
 from foldyn.dynamics import timing
 from foldyn.dynamics.driver import prepare
 from foldyn.dynamics.gpu.choice import DEVICES, choose
@@ -116,6 +117,7 @@ def simulate_many(
             like = next((m for m in motions[:1] if dt is not None and _takes_starts(m, case)), None)
             asked = "gpu" if device == "gpu" else "cpu"
             try:
+                refuse_releases(case, "fd.simulate_many")
                 given = case, duration, method, dt, every_steps, interval, state
                 motions.append(
                     _from_start(like, state) if like

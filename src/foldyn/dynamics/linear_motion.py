@@ -15,13 +15,15 @@ from scipy import sparse
 from foldyn.cases import Case, Continuation, State
 from foldyn.cases.air import refuse_wind
 from foldyn.cases.constraints import AGREES
+from foldyn.cases.releases import refuse_releases
 from foldyn.cases.springs import refuse_driven
 from foldyn.dynamics import timing
 from foldyn.dynamics.audit import audited, energy_error
+from foldyn.dynamics.in_memory import InMemory
 from foldyn.dynamics.initial import MODAL, check_imposed, check_start, check_steady
 from foldyn.dynamics.method_choice import AUTO
 from foldyn.dynamics.motion_state import Samples, StepPlan, samples
-from foldyn.dynamics.progress import Progress, Reporter, reported
+from foldyn.dynamics.progress import Progress, Reporter
 from foldyn.dynamics.sampling import Sampler, SamplingError
 from foldyn.dynamics.superposition import Bases, Matrices, Steps, Superposition, matrices, steps_of
 from foldyn.errors import ComputationError, InputError, ModelRangeWarning, warn
@@ -31,8 +33,6 @@ from foldyn.values import number
 
 if TYPE_CHECKING:
     import xarray
-
-    from foldyn.dynamics.checkpoint import Keeping
 
 SAMPLES = 2000  # by default
 WHOLE = 4.0  # a step limit, relative to the duration, that limits no step
@@ -86,6 +86,8 @@ def _refuse_nonlinear(case: Case) -> None:
             "air",
         )
     refuse_driven(case, "motions of superelements")
+    bars = "leave it out, or take bars and hinges, or a shell"
+    refuse_releases(case, "a motion of superelements", bars)
     if case.remembering:
         raise InputError(
             f": {case.remembering[0].law.name} has memory, which motions of superelements leave "
@@ -94,8 +96,10 @@ def _refuse_nonlinear(case: Case) -> None:
         )
 
 
-class LinearMotion:
+class LinearMotion(InMemory):
     """A motion of superelements that is ready to be computed; see `driver.prepared`."""
+
+    kind = MODAL
 
     def __init__(
         self, case: Case, plan: StepPlan, initial: State | None, sampler: Sampler,
@@ -113,28 +117,6 @@ class LinearMotion:
     def expected_samples(self) -> int:
         """Number of samples."""
         return timing.expected_samples(self.plan)
-
-    def finished(self, keeping: Keeping) -> None:
-        """No stored result: a motion that takes seconds is computed again."""
-
-    def run_into_file(
-        self, keeping: Keeping, progress: bool | Reporter | None = None
-    ) -> xarray.Dataset:
-        """Compute the motion and write its result to its file."""
-        with keeping.held():
-            return keeping.save_result(self.run(progress, keeping))
-
-    def run(
-        self, progress: bool | Reporter | None = None, keeping: Keeping | None = None
-    ) -> xarray.Dataset:
-        """Compute the motion; see `driver.simulate`.
-
-        `keeping` has nothing to keep of it, but refuses to replace an interrupted motion.
-        """
-        if keeping is not None:
-            keeping.begin({"method": MODAL}, {})
-        with reported(progress) as report:
-            return self._computed(report)
 
     def _computed(self, report: Reporter) -> xarray.Dataset:
         began, case, plan = time.perf_counter(), self.case, self.plan

@@ -47,7 +47,7 @@ class Sampler:
     def __init__(self, case: Case, given: Any, u: NDArray, v: NDArray, start: float) -> None:
         if not isinstance(given, Mapping):
             raise InputError(f" = {show(given)}: give functions by name, as {{'tip': f}}", "sample")
-        structure, own = case.structure, _forces_inside(case)
+        structure, own = case.structure, forces_inside(case)
         taken = {*TAKEN, *case.energy_groups, *own}
         sizes = {"node": len(structure.nodes), "axis": 3, "support": len(case.reaction_dofs)}
         self._quantities: dict[str, tuple[Quantity, tuple[int, ...]]] = {}  # with their shapes
@@ -133,7 +133,7 @@ def _value(quantity: Quantity, u: NDArray, v: NDArray, time: float) -> NDArray:
     return value
 
 
-def _forces_inside(case: Case) -> dict[str, Quantity]:
+def forces_inside(case: Case) -> dict[str, Quantity]:
     """Quantities that are sampled with bars, cables and contact; empty without these."""
     lines = case.lines
 

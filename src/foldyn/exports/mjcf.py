@@ -26,6 +26,7 @@ from foldyn.cases.damping import CreaseDamping, Rayleigh, StrainDamping
 from foldyn.cases.history import CONSTANT
 from foldyn.cases.latches import Latch
 from foldyn.cases.loads import Actuate, Gravity
+from foldyn.cases.releases import refuse_releases
 from foldyn.cases.selection import resolve_creases
 from foldyn.cases.stops import SIDES, Stop
 from foldyn.cases.supports import BaseMotion, Dashpot, Fix
@@ -275,6 +276,7 @@ def _hinges(
 # ------------------------------------------------------------------ what is refused
 def _check(case: Case) -> None:
     """Refuse what would move differently; warn of what is left out."""
+    refuse_releases(case, "a model of MuJoCo")
     structure = case.structure
     if structure.linear or structure.pattern is None:
         raise InputError(

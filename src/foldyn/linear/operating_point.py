@@ -12,6 +12,7 @@ from scipy import sparse
 from foldyn.cases import Case, State
 from foldyn.cases.case_assembly import SomeLoads
 from foldyn.cases.history import STEADY
+from foldyn.cases.releases import unreleased
 from foldyn.errors import FoldynWarning, InputError, warn
 from foldyn.mechanics.assembly import Assembly
 from foldyn.mechanics.following import NO_POTENTIAL
@@ -100,7 +101,7 @@ def _equilibrium(case: Case) -> tuple[NDArray, NDArray | None]:
     Superlinear hinges need one more Newton step: with a residual at round-off, a hinge at 1e-6 rad
     from rest is still off by 1e-4 of that turn, which affects its slope.
     """
-    factors = [0.0, 1.0] if drives(case, ()) else [0.0]
+    case, factors = unreleased(case), [0.0, 1.0] if drives(case, ()) else [0.0]
     nodes, body = case.structure.nodes, case.body
     free = free_rigid_motions(nodes, case.constraints, body.holds(np.zeros(body.size))).shape[1] > 0
     with warnings.catch_warnings():  # the linearization itself gives these warnings

@@ -27,6 +27,7 @@ from scipy.linalg import block_diag
 from foldyn.algebra.eigen import Pencil
 from foldyn.cases import BaseMotion, Case, Force, State
 from foldyn.cases.directions import AXES
+from foldyn.cases.releases import refuse_releases
 from foldyn.errors import InputError, ModelRangeWarning, warn
 from foldyn.linear.amounts import Amounts, Parts, covered_mass, squared_parts
 from foldyn.linear.excitation import Drive, drive_of
@@ -145,7 +146,8 @@ def random_response(
     at = np.zeros(0)
     if frequencies is not None:
         at = increasing("frequencies", frequencies, above=0.0, unit="Hz")
-    drives = _drives(of_kind("case", case, Case), base, forces)
+    refuse_releases(of_kind("case", case, Case), "random vibration")
+    drives = _drives(case, base, forces)
     together = _coherence(coherence, len(forces))
     parts = Parts(
         case, state, load_factor=load_factor, stresses=flag("stresses", stresses),

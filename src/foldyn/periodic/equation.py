@@ -27,6 +27,7 @@ from scipy.linalg import eigh
 from foldyn.attractors.drive import check_harmonic, lowest_frequency
 from foldyn.cases import Case, Constant, Harmonic, Origin
 from foldyn.cases.air import refuse_air
+from foldyn.cases.releases import refuse_releases
 from foldyn.cases.springs import refuse_driven
 from foldyn.dynamics.dampers import damping_terms
 from foldyn.dynamics.inertia import check_mass
@@ -166,6 +167,7 @@ def check_smooth(case: Case, name: str) -> None:
         )
     refuse_air(case, name)
     refuse_driven(case, name)
+    refuse_releases(case, name)
     if case.remembering:
         raise InputError(
             f"structure: {name} takes forces that depend on the displacement alone, and some "

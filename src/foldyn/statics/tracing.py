@@ -31,6 +31,7 @@ from foldyn.cases.constraints import check_tied
 from foldyn.cases.contact_checks import check_contact, check_driven
 from foldyn.cases.decode import Part, PartOf
 from foldyn.cases.directions import AXES, Axis
+from foldyn.cases.releases import refuse_releases
 from foldyn.errors import InputError
 from foldyn.mechanics.term import Unstrained
 from foldyn.ram_limit import check_memory
@@ -201,7 +202,8 @@ def trace(
     >>> path.displacement.sel(node=0, axis="x").values.round(4).tolist()
     [-0.0176, -0.0348]
     """
-    of_kind("case", case, Case)
+    two = "trace up to there, and go on without this part from initial = fd.initial_state(path)"
+    refuse_releases(of_kind("case", case, Case), "a path, which has no time,", two)
     choice("method", method, METHODS)
     if steps is not None:
         check_steps(steps, case.structure.nodes.size)
