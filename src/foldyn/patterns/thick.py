@@ -206,7 +206,10 @@ def _plane(
     heights = np.array([*known.values()])
     spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
     if spread[-1] < SAME * span:  # collinear
-        points = np.vstack([points, _centroid(flat)])
+        import shapely  # slow to import
+
+        centroid = shapely.Polygon(flat).centroid.coords[0]
+        points = np.vstack([points, centroid])
         heights = np.append(heights, 0.0)
     system = np.column_stack([np.ones(len(points)), points / span])
     plane = np.linalg.lstsq(system, heights, rcond=None)[0]
@@ -217,13 +220,6 @@ def _plane(
             "pattern",
         )
     return np.column_stack([np.ones(len(flat)), flat / span]) @ plane
-
-
-def _centroid(x: NDArray) -> NDArray[np.float64]:
-    """Area centroid (2,) of a polygon x (k, 2)."""
-    y = np.roll(x, -1, axis=0)
-    cross = x[:, 0] * y[:, 1] - y[:, 0] * x[:, 1]
-    return ((x + y) * cross[:, None]).sum(axis=0) / (3.0 * cross.sum())
 
 
 def _shifts(height: NDArray, pattern: Pattern) -> NDArray[np.float64]:

@@ -13,13 +13,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from foldyn.errors import InputError, quietly, warn
 from foldyn.patterns.boards import Boards
-from foldyn.patterns.generators.arguments import check_size
+from foldyn.patterns.generators.arguments import check_size, two_counts
 from foldyn.patterns.geometry import FaceGeometry
 from foldyn.patterns.screw import direction
 from foldyn.patterns.tiling import glue, half_edges
 from foldyn.patterns.tiling import periods as periods_of
 from foldyn.patterns.topology import Topology, around, edge_lookup, edge_of
-from foldyn.values import flag, number, numbers, show, vector, whole
+from foldyn.values import flag, number, numbers, show, vector
 
 FLAT = 1e-6  # rad: a crease between copies within this angle from pi gets no letter
 TURNED = {"M": "V", "V": "M"}
@@ -135,7 +135,7 @@ class Transforms(Topology, FaceGeometry):
         InputError
             No periods are found, copies do not meet along edges, or panels are thick.
         """
-        first, second = _counts(counts)
+        first, second = two_counts("counts", counts, "numbers, as in (3, 2)")
         _thin(self)
         check_size("counts", first * second * len(self.vertices))
         near = number("tolerance", tolerance, above=0.0) * self.size
@@ -317,14 +317,6 @@ def _given(steps: Any) -> NDArray[np.float64]:
             f" = {show(steps)}: give two translations, as in [(0.1, 0, 0), (0, 0.1, 0)]", "periods"
         )
     return array
-
-
-def _counts(counts: Any) -> tuple[int, int]:
-    try:
-        first, second = counts
-    except (TypeError, ValueError):
-        raise InputError(f" = {show(counts)}: give two numbers, as in (3, 2)", "counts") from None
-    return whole("counts[0]", first, least=1), whole("counts[1]", second, least=1)
 
 
 def _thin(pattern: Transforms) -> None:
