@@ -290,12 +290,10 @@ def _status(arguments: Sequence[str] | None, out: Outlet) -> int:
             most = 1.0 if told or given.force else HALF
             with at_most(most), noticed(getattr(given, "quiet", False)):
                 _call(given)
-    except InputError as error:
-        return _say(str(error), BAD_INPUT)
+    except (InputError, MemoryError) as error:
+        return _say(reason(error), BAD_INPUT)
     except ComputationError as error:
         return _say(str(error), FAILED)
-    except MemoryError as error:
-        return _say(reason(error), BAD_INPUT)
     except OSError as error:  # a full disk, or a folder that vanished during the run
         return _say(f"cannot write the results: {reason(error)}", FAILED)
     except KeyboardInterrupt as stop:
