@@ -254,9 +254,7 @@ class Chirp(Formula):
         """See `History.jumps`."""
         ends = (0.0, math.nextafter(self.duration, 0.0))
         return tuple(
-            time
-            for time, end in zip((0.0, self.duration), ends, strict=True)
-            if abs(self(end)) > 1e-9
+            time for time, end in zip(self.knots(), ends, strict=True) if abs(self(end)) > 1e-9
         )
 
     def knots(self) -> tuple[float, ...]:
