@@ -72,7 +72,7 @@ loads[0].history = "pulse": must be a table { kind = "..." }
 loads[0].history = { kind = "table", times = [0, 1], values = [0, nan] } |
     loads[0].history.values[1] = nan: must be a finite number
 loads[0].history = { kind = "table", times = [0, 2, 1], values = [0, 1, 2] } |
-    loads[0].history.times[2] = 1.0: must be greater than the time before it (2.0)
+    loads[0].history.times[2] = 1.0: must increase, and the one before it is 2.0; sort them
 model.mass = "circumcentre": did you mean 'circumcenter'? choose one of
 model.mass = ["panel", "pannel"] | model.mass[1] = "pannel": did you mean 'panel'?
 model.mass = ["panel", "panel"] | model.mass[1] = "panel": is listed twice

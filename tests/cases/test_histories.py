@@ -124,7 +124,7 @@ def test_values(history, time, factor) -> None:
         (lambda: Chirp(1, 2, 3, math.inf), "phase = inf: must be a finite number"),
         (lambda: Table([0, 1], [0, math.nan]), r"values\[1\] = nan: must be a finite number"),
         (lambda: Table([0, 1], ["a", "b"]), "values = .*: must be numbers"),
-        (lambda: Table([0, 1, 1], [0, 1, 2]), r"times\[2\] = 1.0: must be greater than"),
+        (lambda: Table([0, 1, 1], [0, 1, 2]), r"times\[2\] = 1.0: must increase"),
         (lambda: Table([0, 1], [0, 1, 2]), r"as many numbers as times \(2\)"),
         (lambda: Table([0], [0]), "times = .*: must be a list of at least two numbers"),
         (lambda: as_history("pulse"), 'history = "pulse": must be a history'),

@@ -158,7 +158,7 @@ def test_a_reach_longer_than_the_picture(sharp):
     [
         (["--roi", "1.5,2,300,300"], "--roi 1.5,2,300,300: 1.5 is not a whole number"),
         (["--model", "herkal/specimen", "--nodes", "1,2.5"], "--nodes 1,2.5: 2.5 is not a whole"),
-        (["--rate", "nan"], "--rate nan: every number must be finite"),
+        (["--rate", "nan"], "--rate = nan: must be a finite number"),
         (["--distance", "0"], "--distance = 0.0: must be greater than 0 m"),
         (["--model", "film.mkv"], "film.mkv: is not a text file in UTF-8; give a case file"),
     ],

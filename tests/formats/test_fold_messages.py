@@ -116,10 +116,10 @@ def test_a_frame_inherits_from_its_ancestors(file):
 @pytest.mark.parametrize(
     ("frame", "message"),
     [
-        (9, "frame = 9: the file has the frames 0 to 8"),
-        (-1, "frame = -1: the file has the frames"),
-        (True, "frame = true: the file"),
-        (1.0, "frame = 1.0: the file"),
+        (9, "frame = 9: must be at most 8"),
+        (-1, "frame = -1: must be a whole number, at least 0"),
+        (True, "frame = true: must be a whole number"),
+        (1.0, "frame = 1.0: must be a whole number"),
         ("none", 'framehas no frame with the title "none"; titles are "lifted", "named"'),
         ("twice", 'framehas 2 frames with the title "twice"'),
         (4, "vertices_coords is missing: only other frames have it; choose one by frame = 1, 3"),

@@ -273,10 +273,8 @@ class Loaded:
         spread = load.distributed(self.structure, place) if self.structure.linear else None
         if spread is None:
             return load.following(self.structure, place)
-        forces, nodal = (
-            self.structure.spread(spread, self.held_edges),
-            load.forces(self.structure, place),
-        )
+        forces = self.structure.spread(spread, self.held_edges)
+        nodal = load.forces(self.structure, place)
         if nodal is not None:
             forces[: nodal.size] -= nodal.ravel()
         return pushes(np.arange(len(forces)), forces)
@@ -358,12 +356,12 @@ class Damped(Supported):
                 with faults.collected():
                     part.per_length(self.structure, "damping")
         if self.strain_damping and self.structure.body.strains() is None:
-            with faults.collected():
-                raise InputError(
-                    "damping: StrainDamping takes bars and hinges, and the panels of this model "
-                    'bend as plates; take preset = "plate", which has hinges in panels, '
-                    "CreaseDamping, or Rayleigh for what hardly turns"
-                )
+            text = (
+                "damping: StrainDamping takes bars and hinges, and the panels of this model bend "
+                'as plates; take preset = "plate", which has hinges in panels, CreaseDamping, or '
+                "Rayleigh for what hardly turns"
+            )
+            faults.add(InputError(text))
 
     @cached_property
     def rayleigh(self) -> Rayleigh:

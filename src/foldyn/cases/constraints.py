@@ -175,8 +175,8 @@ class Constraints:
 
     @cached_property
     def along(self) -> NDArray[np.bool_]:
-        """Whether each equation (k,) belongs to a support along a direction."""
-        return np.array([_is_direction(one) for one in self.equations], bool)
+        """Whether each equation (k,) belongs to a support along a direction, with one node."""
+        return np.array([len({dof // 3 for dof in one.dofs}) == 1 for one in self.equations], bool)
 
     # ------------------------------------------------------------------ supports that move
     def moved(self, shape: NDArray, values: NDArray, place: str) -> NDArray:
@@ -212,7 +212,7 @@ class Constraints:
     @cached_property
     def supported(self) -> NDArray[np.int64]:
         """Dofs (s,), increasing, on which supports exert forces, along axes or directions."""
-        along = [dof for one in self.equations if _is_direction(one) for dof in one.dofs]
+        along = self.rows[np.flatnonzero(self.along)].indices
         return np.union1d(np.flatnonzero(self.held), along).astype(np.int64)
 
     @cached_property
@@ -222,17 +222,12 @@ class Constraints:
         own = sparse.diags_array(self.held.astype(float))
         if not self:
             return sparse.csr_array(sparse.csr_array(own)[self.supported])
-        kept = [self.equations[k] for k in self._solved.kept]
-        straight = np.array([float(_is_direction(one)) for one in kept])
+        kept = self._solved.kept
+        straight = self.along[kept].astype(float)
         # the multipliers of directions
         put = sparse.csr_array((straight, (np.arange(len(kept)), self.slaves)), (len(kept), size))
-        exerted = own + self.rows[self._solved.kept].T @ put
+        exerted = own + self.rows[kept].T @ put
         return sparse.csr_array((sparse.csr_array(exerted) @ self.basis.T)[self.supported])
-
-
-def _is_direction(equation: Equation) -> bool:
-    """Whether an equation concerns a single node, unlike equations of links and panels."""
-    return len({dof // 3 for dof in equation.dofs}) == 1
 
 
 def equations_of(structure: Discretized, supports: Iterable[tuple[str, Any]]) -> list[Equation]:
@@ -249,7 +244,9 @@ def equations_of(structure: Discretized, supports: Iterable[tuple[str, Any]]) ->
             links += _link(structure, support, place, nodes)
         elif support.direction is not None:
             directions += _along(support, place, nodes)
-    return [*directions, *links, *_rigid(structure)]
+    for plate in structure.plates:
+        links += _riding(STRUCTURE, plate.riders, plate.corners, plate.weights)
+    return [*directions, *links]
 
 
 def values_of(owners: NDArray, values: Mapping[str, Any]) -> NDArray[np.float64]:
@@ -321,14 +318,6 @@ def _link(structure: Discretized, link: Link, place: str, nodes: NDArray) -> lis
             f"{place}.nodes",
         )
     return _riding(place, nodes, corners, weights)
-
-
-def _rigid(structure: Discretized) -> list[Equation]:
-    return [
-        equation
-        for plate in structure.plates
-        for equation in _riding(STRUCTURE, plate.riders, plate.corners, plate.weights)
-    ]
 
 
 def _riding(owner: str, nodes: NDArray, corners: NDArray, weights: NDArray) -> list[Equation]:

@@ -20,7 +20,7 @@ from foldyn.cases.csv_table import read_columns
 from foldyn.cases.history import Constant, Formula, Waveform
 from foldyn.errors import InputError
 from foldyn.jit.compiled import inner_scalar
-from foldyn.values import SMALLEST, number, numbers, show
+from foldyn.values import increasing, number, numbers, show
 
 TABLE = 8  # code of tables
 SHARP = 0.01  # deviation from a straight line at a sharp corner, relative to the table's range
@@ -254,9 +254,7 @@ class Chirp(Formula):
         """See `History.jumps`."""
         ends = (0.0, math.nextafter(self.duration, 0.0))
         return tuple(
-            time
-            for time, end in zip((0.0, self.duration), ends, strict=True)
-            if abs(self(end)) > 1e-9
+            time for time, end in zip(self.knots(), ends, strict=True) if abs(self(end)) > 1e-9
         )
 
     def knots(self) -> tuple[float, ...]:
@@ -279,28 +277,21 @@ class Table(Formula):
         displacements of supports, whose velocity must not jump at every value.
     """
 
-    times: Annotated[Any, Check(numbers, unit="s")]
+    times: Annotated[Any, Check(increasing, unit="s")]
     values: Annotated[Any, Check(numbers)]
     smooth: Flag = False
     kind: ClassVar[str] = "table"
     formulas = (Waveform(TABLE, None),)
 
     def agree(self) -> None:
-        """Refuse times that do not increase, and numbers of times and values that differ."""
+        """Refuse a single time, and numbers of times and values that differ."""
         times, values = self.times, self.values
-        if times.ndim != 1 or times.size < 2:
+        if times.size < 2:
             raise InputError(f" = {show(times)}: must be a list of at least two numbers", "times")
         if values.shape != times.shape:
             raise InputError(
                 f" = {show(values)}: must be a list of as many numbers as times ({times.size})",
                 "values",
-            )
-        back = np.flatnonzero(np.diff(times) < SMALLEST)
-        if back.size:
-            i = int(back[0]) + 1
-            raise InputError(
-                f" = {times[i]}: must be greater than the time before it ({times[i - 1]})",
-                f"times[{i}]",
             )
 
     @classmethod

@@ -223,10 +223,7 @@ class StopsTerm(BeyondAngles):
         kernels = {FORCES: _forces, ENERGIES: _energies, MEAN_FORCES: _mean_forces}
         return CompiledTerm(self.context(group), kernels)
 
-    @property
-    def places(self) -> tuple[NDArray, NDArray]:
-        """See `Term`."""
-        return self.coupled()
+    places: Any = property(BeyondAngles.coupled)
 
     def entries(self, q: NDArray, floor: float = -np.inf) -> NDArray:
         """See `Term`."""
@@ -278,10 +275,7 @@ class StopDampersTerm(BeyondAngles):
         """Dampers that always act; see `Term`."""
         return StopDampersTerm(self.stops._replace(side=np.zeros(len(self.stops.side))), self.rows)
 
-    @property
-    def damping_places(self) -> tuple[NDArray, NDArray]:
-        """See `Term`."""
-        return self.coupled()
+    damping_places: Any = property(BeyondAngles.coupled)
 
     def damping_entries(self, q: NDArray, hidden: float = 1.0) -> NDArray:
         """See `Term`."""

@@ -92,11 +92,7 @@ def _export(given: argparse.Namespace, what: Path | Case) -> None:
     """Write a result or a case in the format of another program."""
     from foldyn.exports import export
 
-    for name in PATTERNS_ONLY:
-        if getattr(given, name):
-            raise InputError(
-                ": only for pattern files; leave it out", f"--{name.replace('_', '-')}"
-            )
+    _refuse(given, PATTERNS_ONLY, "pattern files")
     if isinstance(given.frame, str):
         raise InputError(f" = {given.frame}: give the number of a sample, from 0", "--frame")
     options = {
@@ -107,6 +103,14 @@ def _export(given: argparse.Namespace, what: Path | Case) -> None:
     except InputError as error:
         raise error.within("--" if error.key in options else "") from None
     speech(given.quiet)(f"wrote {_listed(files)}")
+
+
+def _refuse(given: argparse.Namespace, names: Sequence[str], kind: str) -> None:
+    """Refuse options that apply to another kind of files."""
+    for name in names:
+        value = getattr(given, name)
+        if value is not None and value is not False:
+            raise InputError(f": only for {kind}; leave it out", f"--{name.replace('_', '-')}")
 
 
 def _listed(files: Sequence[Path]) -> str:
@@ -122,10 +126,8 @@ def _convert_pattern(given: argparse.Namespace, source: Path) -> None:
     """Write a pattern file in another format; print the diagnosis of the pattern or warn of it."""
     from foldyn.formats import diagnose, read_pattern, write_pattern
 
-    for names, kind in ((RESULTS_ONLY, "results (.nc)"), (DECKS_ONLY, "input decks (.inp, .tcl)")):
-        for name in names:
-            if getattr(given, name) is not None:
-                raise InputError(f": only for {kind}; leave it out", f"--{name}")
+    _refuse(given, RESULTS_ONLY, "results (.nc)")
+    _refuse(given, DECKS_ONLY, "input decks (.inp, .tcl)")
     if given.check:
         pattern, diagnosis = diagnose(source, facets="line", **reading(given))
         print(f"{source}: {pattern!r}")

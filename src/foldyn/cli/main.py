@@ -37,10 +37,12 @@ from foldyn.ram_limit import HALF, at_most
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
 OTHERS = {
-    "convert": convert, "design": run_design, "fit": run_fit, "fold": run_fold, "study": study,
-    "sweep": run_sweep, "track": track, "view": run_view, "warm-up": run_warm_up,
+    "convert": (add_convert, convert), "fold": (add_fold, run_fold), "study": (add_study, study),
+    "fit": (add_fit, run_fit), "sweep": (add_sweep, run_sweep), "design": (add_design, run_design),
+    "track": (add_track, track), "view": (add_view, run_view),
+    "warm-up": (add_warm_up, run_warm_up),
 }  # fmt: skip
-"""Commands that take something other than a case file."""
+"""Commands in modules of their own: the functions that add their arguments, and that run them."""
 SILENT = {"OPENCV_FFMPEG_LOGLEVEL": "-8", "OPENCV_LOG_LEVEL": "SILENT"}
 """Environment variables that silence the decoders of OpenCV: we report broken films ourselves."""
 
@@ -180,15 +182,8 @@ def parser() -> argparse.ArgumentParser:
     })  # fmt: skip
     _add_secant(fidelity)
 
-    add_convert(commands)
-    add_fold(commands)
-    add_study(commands)
-    add_fit(commands)
-    add_sweep(commands)
-    add_design(commands)
-    add_track(commands)
-    add_view(commands)
-    add_warm_up(commands)
+    for add_other, _ in OTHERS.values():
+        add_other(commands)
     commands.add_parser(
         "schema",
         help="JSON Schema of case files, by which editors complete and check them",
@@ -295,12 +290,10 @@ def _status(arguments: Sequence[str] | None, out: Outlet) -> int:
             most = 1.0 if told or given.force else HALF
             with at_most(most), noticed(getattr(given, "quiet", False)):
                 _call(given)
-    except InputError as error:
-        return _say(str(error), BAD_INPUT)
+    except (InputError, MemoryError) as error:
+        return _say(reason(error), BAD_INPUT)
     except ComputationError as error:
         return _say(str(error), FAILED)
-    except MemoryError as error:
-        return _say(reason(error), BAD_INPUT)
     except OSError as error:  # a full disk, or a folder that vanished during the run
         return _say(f"cannot write the results: {reason(error)}", FAILED)
     except KeyboardInterrupt as stop:
@@ -330,7 +323,7 @@ def _call(given: argparse.Namespace) -> None:
 
         print(json.dumps(case_schema(), indent=1))
     elif given.command in OTHERS:
-        OTHERS[given.command](given)
+        OTHERS[given.command][1](given)
     else:
         with uncollected_imports():
             from foldyn.cli.run import run

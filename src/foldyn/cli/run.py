@@ -5,8 +5,8 @@ from __future__ import annotations
 import sys
 import warnings
 from argparse import Namespace
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import ExitStack, contextmanager, nullcontext
+from collections.abc import Callable, Mapping
+from contextlib import ExitStack, nullcontext
 from dataclasses import replace
 from functools import cache, partial
 from pathlib import Path
@@ -61,7 +61,10 @@ def run(given: Namespace) -> Path:
         case_file = _read(path, given)
         if getattr(given, "film", None):
             case_file = replace(case_file, output=replace(case_file.output, animation=given.film))
-        changes = _device(case_file, getattr(given, "device", None))
+        device = getattr(given, "device", None)
+        if device is not None and "device" not in case_file.analysis.takes:
+            raise InputError("--device: is for motions only; leave it out")
+        changes = {} if device is None else {"device": device}
         task = list[Computation]()
         for mass in case_file.masses:
             told.where = mass if len(case_file.masses) > 1 else ""
@@ -80,8 +83,11 @@ def run(given: Namespace) -> Path:
     pages = ["report.html"] if page else []
     with (
         held(folder, given.out, [*names, *pages], owner, given.replace, DRAWN) as kept,
-        _held_results(task),
+        ExitStack() as stack,
     ):
+        for one in task:  # no other process may store to the results of motions
+            if isinstance(one.compute, MotionComputation) and one.compute.kept:
+                stack.enter_context(one.compute.kept.held())
         with noted_warnings(path if page else None) as noted:
             introduction = _introduction(case_file, told, say)
             done = _computed(task, kept, introduction, not given.quiet and sys.stderr.isatty(), say)
@@ -95,16 +101,6 @@ def run(given: Namespace) -> Path:
                 written = case_file.analysis.page(case_file, done, folder, call, given.figures)
             say(f"wrote {'figures and ' if drawn else ''}{written}")
     return folder
-
-
-@contextmanager
-def _held_results(task: list[Computation]) -> Iterator[None]:
-    """Lock the result files of motions, so that no other process stores to them."""
-    with ExitStack() as stack:
-        for one in task:
-            if isinstance(one.compute, MotionComputation) and one.compute.kept:
-                stack.enter_context(one.compute.kept.held())
-        yield
 
 
 def _keep(task: list[Computation], folder: Path, given: Namespace) -> None:
@@ -123,15 +119,6 @@ def _keep(task: list[Computation], folder: Path, given: Namespace) -> None:
         elif resume or seconds is not None:
             option = "--resume" if resume else "--checkpoint"
             raise InputError(f"{option}: only motions have checkpoints; leave it out")
-
-
-def _device(case_file: CaseFile, device: str | None) -> dict[str, str]:
-    """Parse the device option."""
-    if device is None:
-        return {}
-    if "device" not in case_file.analysis.takes:
-        raise InputError("--device: is for motions only; leave it out")
-    return {"device": device}
 
 
 def _read(path: Path, given: Namespace) -> CaseFile:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from argparse import Namespace
 from collections.abc import Sequence
 from pathlib import Path
@@ -170,8 +169,6 @@ def _numbers(option: str, text: str, count: int | None) -> list[float]:
         raise InputError(f"{option} {text}: give numbers separated by commas") from None
     if count is not None and len(values) != count:
         raise InputError(f"{option} {text}: {len(values)} numbers; {count} are needed")
-    if not all(map(math.isfinite, values)):
-        raise InputError(f"{option} {text}: every number must be finite")
     return [number(option, value) for value in values]
 
 

@@ -105,6 +105,14 @@ class Drawing:
         return cls(np.array(points), ends, tuple(letters), angles, **more)
 
 
+def read_number(text: str, place: str, remedy: str) -> float:
+    """Read a number of a file, or refuse it with a remedy."""
+    try:
+        return parsed(text)
+    except ValueError:
+        raise InputError(f" = {show(text)}: {remedy}", place) from None
+
+
 def coordinate(text: str, place: str, given: str = "") -> float:
     """Parse a coordinate.
 

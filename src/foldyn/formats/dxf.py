@@ -21,14 +21,14 @@ from numpy.typing import NDArray
 
 from foldyn.errors import InputError, optional
 from foldyn.formats.chords import Chords
-from foldyn.formats.drawing import METERS, Drawing, count
-from foldyn.formats.line_colors import COLORS, RGB, color_doubts, nearest
+from foldyn.formats.drawing import METERS, Drawing, count, read_number
+from foldyn.formats.line_colors import RGB, color_doubts, letter_of
 from foldyn.formats.lines import MOST_LINES, too_many
 from foldyn.formats.svg import NAMES, PER_METER
 from foldyn.formats.writers import flat_points, letters, warn_of_angles
 from foldyn.input_files import DEEPEST
 from foldyn.patterns import Pattern
-from foldyn.values import LONGEST, parsed, shortened, show
+from foldyn.values import LONGEST, shortened
 
 _LAYERS = (
     ("M", re.compile(r"mountain|^m$")),
@@ -113,12 +113,7 @@ def _check_numbers(text: str) -> None:
     lines = text.splitlines()
     for number, (code, value) in enumerate(zip(lines[::2], lines[1::2], strict=False)):
         if code.strip().isdecimal() and 10 <= int(code) < 60:
-            try:
-                parsed(value.strip())
-            except ValueError:
-                raise InputError(
-                    f" = {show(value.strip())}: must be a number", f"line {2 * number + 2}"
-                ) from None
+            read_number(value.strip(), f"line {2 * number + 2}", "must be a number")
 
 
 @contextmanager
@@ -193,10 +188,7 @@ def _along(entity: Any, path: Any, tolerance: float) -> NDArray[np.float64]:
         found = islice((entity if exact else path).flattening(tolerance), MOST_LINES + 2)
     else:
         found = path.control_vertices()
-    points = np.array([(v.x, v.y, v.z) for v in found]).reshape(-1, 3)
-    if not (np.abs(points) <= LONGEST).all():
-        raise InputError(f": coordinates must be finite, and at most {LONGEST:g}", _place(entity))
-    return points
+    return np.array([(v.x, v.y, v.z) for v in found]).reshape(-1, 3)
 
 
 def _letter(entity: Any, document: Any, colors: Counter[tuple[RGB, RGB | None]]) -> str | None:
@@ -205,10 +197,7 @@ def _letter(entity: Any, document: Any, colors: Counter[tuple[RGB, RGB | None]])
     for letter, pattern in _LAYERS:
         if pattern.search(name.lower()):
             return letter
-    color = _color(entity, document, name)
-    to = nearest(color)
-    colors[color, to] += 1
-    return None if to is None else COLORS[to][0]
+    return letter_of(_color(entity, document, name), colors)
 
 
 def _color(entity: Any, document: Any, layer: str) -> RGB:

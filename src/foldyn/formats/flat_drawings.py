@@ -42,11 +42,10 @@ def flat_panels(lines: Lines, notes: Notes, tolerance: float | None = None) -> P
     notes.contradict(contradictions)
     planar.check_crowding(whole)
     whole = _on_lines(whole, tolerance, notes)
-    pieces = planar.split(whole, tolerance)
-    if len(pieces.ends) > len(whole.ends):
-        more = len(pieces.ends) - len(whole.ends)
+    parted = planar.split(whole, tolerance)
+    if len(parted.ends) > len(whole.ends):
+        more = len(parted.ends) - len(whole.ends)
         notes.repairs.append(f"split lines where they meet: {count(more, 'piece')} more")
-    parted = pieces
     suspects = np.unique(planar.points_on(whole, 0.5 * tolerance)[:, 1])
     pieces = straightened(parted, suspects, tolerance)
     if len(pieces.ends) < len(parted.ends):

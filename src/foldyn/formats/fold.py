@@ -17,13 +17,13 @@ from numpy.typing import NDArray
 
 from foldyn.errors import InputError
 from foldyn.formats.drawing import METERS, Drawing, count
-from foldyn.formats.writers import is_plane, letters
+from foldyn.formats.writers import letters
 from foldyn.input_files import from_json
 from foldyn.patterns import Pattern
 from foldyn.patterns.frames import Frame, fold_angles
 from foldyn.patterns.topology import edge_rows
 from foldyn.patterns.transforms import FACE_ORDERS
-from foldyn.values import choice, show, single
+from foldyn.values import choice, show, whole
 
 ASSIGNMENTS = ("B", "M", "V", "F", "U", "C", "J")
 FAMILIES = "foldyn:families"
@@ -149,15 +149,8 @@ def _number(frames: Sequence[dict[str, Any]], chosen: int | str | None) -> int:
         raise InputError(
             f": the file has {has} with the title {show(chosen)}; titles are {known}", "frame"
         )
-    number = single(chosen)
-    counts = isinstance(number, int | np.integer) and not isinstance(number, bool)
-    if not counts or not 0 <= number < len(frames):
-        raise InputError(
-            f" = {show(chosen)}: the file has the frames 0 to {len(frames) - 1}; give one of these "
-            "numbers or a title",
-            "frame",
-        )
-    return int(number)
+    what = "the number of a frame of the file; or give its title"
+    return whole("frame", chosen, least=0, most=len(frames) - 1, what=what)
 
 
 def _with_field(document: dict[str, Any], field: str, what: str) -> str:
@@ -332,11 +325,12 @@ def write(pattern: Pattern, frames: Sequence[Frame] = ()) -> str:
         JSON with vertices (two coordinates when all z are 0), faces, edges, their assignment
         and fold angle (degrees, valleys positive; 0 on the boundary), in meters.
     """
-    flat = is_plane(pattern)
+    flat = not pattern.vertices[:, 2].any()
     there = fold_angles(pattern)
     folded = not flat or bool(np.any(np.abs(there) > 1e-6))
     row = {edge: rows[0] for edge, rows in edge_rows(pattern.creases).items() if len(rows) == 1}
     edges = letters(pattern)
+    named = {name: pattern.creases[own].tolist() for name, own in pattern.families.items()}
     rows = [row.get(edge) for edge, *_ in edges]
     wanted = pattern.fold_angles
     angles = there if np.isnan(wanted).all() and folded else wanted
@@ -353,7 +347,7 @@ def write(pattern: Pattern, frames: Sequence[Frame] = ()) -> str:
         "edges_vertices": pattern.edges.tolist(),
         "edges_assignment": [letter for _, letter, _ in edges],
         **({} if np.isnan(angles).all() else {"edges_foldAngle": _degrees(angles, rows)}),
-        **({FAMILIES: _named(pattern)} if pattern.families else {}),
+        **({FAMILIES: named} if named else {}),
         **({WELDS: pattern.welds.tolist()} if any(letter == "F" for _, letter, _ in edges) else {}),
         **pattern.custom,
     }
@@ -381,11 +375,6 @@ def _degrees(angles: NDArray, rows: Sequence[int | None]) -> list[float | None]:
     """Angles of all edges from the angles of creases; 0 on the boundary, None if unknown."""
     found = [0.0 if k is None else float(np.degrees(angles[k])) for k in rows]
     return [None if np.isnan(angle) else angle for angle in found]
-
-
-def _named(pattern: Pattern) -> dict[str, list[list[int]]]:
-    """Vertex pairs of the creases of each family."""
-    return {name: pattern.creases[rows].tolist() for name, rows in pattern.families.items()}
 
 
 def _json(value: Any) -> str:

@@ -7,6 +7,7 @@ computation, Origami 7 (2018), and the notes on SVG of origamisimulator.org.
 from __future__ import annotations
 
 import colorsys
+from collections import Counter
 from collections.abc import Mapping
 
 from foldyn.formats.drawing import count
@@ -49,6 +50,13 @@ def nearest(rgb: RGB) -> RGB | None:
         return (0, 0, 0) if gray < _DARK else (255, 255, 0) if gray < _WHITE else None
     hue = 360 * colorsys.rgb_to_hsv(red, green, blue)[0]
     return next(color for most, color in _HUES if hue <= most)
+
+
+def letter_of(color: RGB, taken: Counter[tuple[RGB, RGB | None]]) -> str | None:
+    """Letter of a line by its color, None if white; the color is counted in `taken`."""
+    to = nearest(color)
+    taken[color, to] += 1
+    return None if to is None else COLORS[to][0]
 
 
 def color_doubts(taken: Mapping[tuple[RGB, RGB | None], int]) -> list[str]:

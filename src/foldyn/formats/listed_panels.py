@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from foldyn.errors import InputError
 from foldyn.formats.drawing import Notes, count
 from foldyn.formats.lines import MOST_PAIRS, Lines, single, without_points
 from foldyn.formats.panels import Panels, compact, renumbered, with_inner_borders
@@ -24,7 +23,6 @@ from foldyn.patterns.topology import (
     components,
     edge_of,
 )
-from foldyn.values import show
 
 _ROUNDS = 8
 
@@ -58,7 +56,7 @@ def listed_panels(
     pairs = [edge_of(a, b) for a, b in lines.ends.tolist()]
     panels = Panels(
         lines.points,
-        _numbered(faces, len(lines.points)),
+        faces,
         dict(zip(pairs, lines.letters.tolist(), strict=True)),
         dict(zip(pairs, lines.angles.tolist(), strict=True)),
     )
@@ -101,19 +99,6 @@ def listed_panels(
             "without a letter"
         )
     return panels
-
-
-def _numbered(faces: Faces, n_vertices: int) -> Faces:
-    """Faces; a missing corner is refused, other errors are repaired or found later."""
-    for f, face in enumerate(faces):
-        bad = [v for v in face if not 0 <= v < n_vertices]
-        if bad:
-            raise InputError(
-                f" = {show(list(face))}: vertex {bad[0]} does not exist; with {n_vertices} "
-                f"vertices the numbers run from 0 to {n_vertices - 1}",
-                f"faces[{f}]",
-            )
-    return tuple(tuple(int(v) for v in face) for face in faces)
 
 
 def _once(panels: Panels) -> tuple[Panels, int]:

@@ -33,8 +33,7 @@ def write(pattern: Pattern) -> str:
     normals /= np.linalg.norm(normals, axis=1, keepdims=True)
     lines = [f"solid {name}"]
     for normal, three in zip(normals.tolist(), corners.tolist(), strict=True):
-        lines.append("facet normal " + " ".join(f"{value:.9g}" for value in normal))
-        lines.append("outer loop")
+        lines += ["facet normal " + " ".join(f"{value:.9g}" for value in normal), "outer loop"]
         lines += ["vertex " + " ".join(map(repr, point)) for point in three]
         lines += ["endloop", "endfacet"]
     return "\n".join([*lines, f"endsolid {name}"]) + "\n"

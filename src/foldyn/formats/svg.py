@@ -24,7 +24,7 @@ from foldyn.errors import InputError
 from foldyn.formats import svg_shapes
 from foldyn.formats.chords import Chords
 from foldyn.formats.drawing import Drawing, count
-from foldyn.formats.line_colors import COLORS, RGB, color_doubts, nearest
+from foldyn.formats.line_colors import COLORS, RGB, color_doubts, letter_of
 from foldyn.formats.lines import MOST_LINES, too_many
 from foldyn.formats.svg_shapes import Curve, Placing, after, length, numbers
 from foldyn.formats.svg_styles import Rules, Style, declared, rules_of, styled
@@ -188,14 +188,9 @@ def _drawing(
     stated: list[float] = []
     taken: Counter[tuple[RGB, RGB | None]] = Counter()
     for (curve, here, style, place), box in zip(lines.curves, boxes, strict=True):
-        letter = style.letter
-        if not letter:
-            color = style.color or (0, 0, 0)
-            to = nearest(color)
-            taken[color, to] += 1
-            if to is None:
-                continue
-            letter = COLORS[to][0]
+        letter = style.letter or letter_of(style.color or (0, 0, 0), taken)
+        if letter is None:
+            continue
         if curve.straight or not chords.tolerance:
             along = box[[0, -1]]
         else:

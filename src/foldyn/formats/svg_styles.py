@@ -9,10 +9,11 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from foldyn.errors import InputError
+from foldyn.formats.drawing import read_number
 from foldyn.formats.line_colors import RGB
 from foldyn.formats.svg_shapes import SHAPES
 from foldyn.formats.xml_text import local
-from foldyn.values import choice, parsed, show
+from foldyn.values import choice, show
 
 if TYPE_CHECKING:
     from xml.etree.ElementTree import Element
@@ -121,10 +122,8 @@ def styled(given: Mapping[str, str], inherited: Style, place: str) -> Style | No
         letter = choice(f"{place}.{ASSIGNMENT}", given[ASSIGNMENT].upper(), "BMVFUCJ")
         style = replace(style, letter=letter)
     if ANGLE in given:
-        try:
-            style = replace(style, angle=parsed(given[ANGLE]))
-        except ValueError:
-            raise InputError(f" = {show(given[ANGLE])}: give degrees", f"{place}.{ANGLE}") from None
+        angle = read_number(given[ANGLE], f"{place}.{ANGLE}", "give degrees")
+        style = replace(style, angle=angle)
     if "visibility" in given and given["visibility"] != "inherit":
         style = replace(style, visible=given["visibility"] == "visible")
     if given.get("color", "inherit") not in ("inherit", "currentColor"):
@@ -196,8 +195,6 @@ def _rgba(value: str, style: Style, place: str) -> tuple[RGB | None, float]:
 
 
 def _share(value: str, place: str) -> float:
-    try:
-        share = parsed(value[:-1]) / 100 if value.endswith("%") else parsed(value)
-    except ValueError:
-        raise InputError(f" = {show(value)}: give a number from 0 to 1", place) from None
+    share = read_number(value.removesuffix("%"), place, "give a number from 0 to 1")
+    share = share / 100 if value.endswith("%") else share
     return min(1.0, max(0.0, share)) if share == share else 1.0

@@ -13,11 +13,6 @@ from foldyn.patterns.topology import Edge, edge_lookup
 PLANE = 1e-9  # relative to the pattern's size: smaller heights count as zero
 
 
-def is_plane(pattern: Pattern) -> bool:
-    """Whether all vertices have z = 0, which files with two coordinates require."""
-    return not np.any(pattern.vertices[:, 2])
-
-
 def flat_points(pattern: Pattern, kind: str) -> NDArray[np.float64]:
     """Coordinates (n, 2), m, of a flat pattern.
 

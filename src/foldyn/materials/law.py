@@ -9,7 +9,6 @@ per element.
 from __future__ import annotations
 
 import math
-from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
 from typing import Any, ClassVar
 
@@ -24,7 +23,7 @@ ANGLES = 722  # number of dihedrals at which the least slope of a law is sought
 CALLED = -1  # code of laws whose functions are called at their addresses
 
 
-class Law(Checked, ABC):
+class Law(Checked):
     """A scalar law with a name and the integer code of its compiled form."""
 
     name: str
@@ -33,7 +32,8 @@ class Law(Checked, ABC):
     """`BarFormulas` or `HingeFormulas` for each code of the law; `code` is that of the first."""
     rest_state: tuple[float, ...]
     compiled: ClassVar[Callable[..., NDArray]]
-    """Function that returns a table of functions of a law for its code; set by the registry."""
+    """Function that returns a table of functions of a law for its code, one per row; set by the
+    registry."""
     known: ClassVar[Mapping[int, Any]]
     """Formulas that the switch knows, by code; set by the registry."""
 
@@ -60,10 +60,6 @@ class Law(Checked, ABC):
                 "has its place in materials/switch.py)",
                 field,
             )
-
-    @abstractmethod
-    def _table(self, *state: ArrayLike) -> NDArray:
-        """All functions of the law, one per row, at states (stretch, or dihedral and rest)."""
 
 
 class BarLaw(Law):

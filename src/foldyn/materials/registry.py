@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import MISSING, Field, fields
+from dataclasses import MISSING
 from typing import Any
 
+from foldyn.arguments import arguments
 from foldyn.errors import InputError
 from foldyn.materials import switch
 from foldyn.materials.branch_switch import MEMORY_LAWS
@@ -35,7 +36,7 @@ def hinge_law(spec: str | HingeLaw, field: str = "hinge law") -> HingeLaw:
 def _law(spec: Any, laws: Mapping[str, Any], base: type[BarLaw | HingeLaw], field: str) -> Any:
     if isinstance(spec, str) and spec in laws:
         kind = laws[spec]
-        missing = [item.name for item in fields(kind) if _required(item)]
+        missing = [name for name, own in arguments(kind).items() if own.default is MISSING]
         if missing:
             raise InputError(
                 f' = "{spec}": the law needs {" and ".join(missing)}; give a '
@@ -49,10 +50,6 @@ def _law(spec: Any, laws: Mapping[str, Any], base: type[BarLaw | HingeLaw], fiel
         )
     spec.check(field)
     return spec
-
-
-def _required(item: Field) -> bool:
-    return item.init and item.default is MISSING and item.default_factory is MISSING
 
 
 MemoryLaw.lookup = staticmethod(hinge_law)

@@ -69,14 +69,8 @@ def fold_angles(given: Any, creases: NDArray[np.int64], named: Named) -> NDArray
                 raise InputError(f": {pair} is not a crease; name its two vertices", "fold_angles")
             angles[row[pair]] = _angle(angle)
         return angles
-    try:
-        entries = list(given)
-    except TypeError:
-        raise InputError(
-            f" = {given!r}: give an angle (rad) for each crease, a mapping from vertex pairs, or "
-            "None",
-            "fold_angles",
-        ) from None
+    what = "angles (rad), one for each crease, or a mapping from vertex pairs, or None"
+    entries = listed("fold_angles", given, what)
     if len(entries) != len(creases):
         raise InputError(
             f" has {len(entries)} angles for {len(creases)} creases: give one for each, NaN for "
@@ -223,20 +217,16 @@ def periods(given: Any, count: int) -> tuple[NDArray[np.int64], ...]:
     count : number of vertices.
     """
     found = []
+    what = "pairs of a vertex and its image, as [(0, 6), (1, 7)]"
     for k, pairs in enumerate(listed("periods", given, "pairs of vertices for each motion")):
-        rows = listed(
-            f"periods[{k}]", pairs, "pairs of a vertex and its image, as [(0, 6), (1, 7)]"
-        )
+        rows = listed(f"periods[{k}]", pairs, what)
         try:
             array = np.array(rows)
         except ValueError:
             array = np.zeros(0)
         good = array.ndim == 2 and array.shape[1:] == (2,) and array.dtype.kind in "iu"
         if not good or not len(array):
-            raise InputError(
-                f" = {show(pairs)}: give pairs of a vertex and its image, as [(0, 6), (1, 7)]",
-                f"periods[{k}]",
-            )
+            raise InputError(f" = {show(pairs)}: give {what}", f"periods[{k}]")
         beyond = array[(array < 0) | (array >= count)]
         if beyond.size:
             raise InputError(f": there is no vertex {beyond[0]} of {count}", f"periods[{k}]")

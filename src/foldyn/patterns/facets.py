@@ -21,6 +21,7 @@ from foldyn.errors import InputError, warn
 from foldyn.patterns.crease_data import crease_rows
 from foldyn.patterns.pattern import Pattern, pattern_of
 from foldyn.patterns.topology import Edge, around, at_junctions, edge_of, edge_rows, vertex_pair
+from foldyn.patterns.transforms import refuse_boards
 from foldyn.values import flag, listed
 
 # What facets become: "weld", removed if panels can be joined, else welds; "line", welds; "hinge",
@@ -86,7 +87,7 @@ def welded(
     )  # fmt: skip
     sides = {frozenset(side) for face in faces for side in around(face)}
     kept = np.setdiff1d(np.arange(len(pattern.creases)), rows)
-    creases = [_pair(pair) for pair in pattern.creases[kept].tolist()]
+    creases = [edge_of(*pair) for pair in pattern.creases[kept].tolist()]
     families = {
         name: pattern.creases[np.intersect1d(members, kept)].tolist()
         for name, members in pattern.families.items()
@@ -100,10 +101,6 @@ def welded(
     )
 
 
-def _pair(edge: Sequence[int] | NDArray) -> Edge:
-    return int(edge[0]), int(edge[1])
-
-
 def _rows(pattern: Pattern, facets: Any) -> NDArray[np.int64]:
     """Row numbers of the creases that are facets."""
     letters = np.array(pattern.assignments, dtype="<U1")
@@ -111,9 +108,8 @@ def _rows(pattern: Pattern, facets: Any) -> NDArray[np.int64]:
         rows = np.flatnonzero((letters == "F") & ~at_junctions(pattern.creases))
         guessed = rows[pattern.unlettered[rows]]
         if 0 < guessed.size < len(letters):  # in a completely flat sheet all creases are facets
-            which = (
-                f"{guessed.size} of {len(letters)} creases, as {_pair(pattern.creases[guessed[0]])}"
-            )
+            first = tuple(pattern.creases[guessed[0]].tolist())
+            which = f"{guessed.size} of {len(letters)} creases, as {first}"
             warn(
                 f"facets: {which}, lie flat and have no letter, and are welded; assign letters to "
                 "those that fold, or name the facets",
@@ -166,7 +162,7 @@ def joined(
         one, two = sorted(whole(face) for face in both)
         if one == two:
             continue
-        union = _union(faces[one], faces[two], _pair(edge))
+        union = _union(faces[one], faces[two], edge_of(*edge))
         if union is not None and _convex(vertices, union, normals[one]):
             faces[one], faces[two], part_of[two] = union, (), one
     return [face for face in faces if face]
@@ -236,11 +232,9 @@ def convex(pattern: Pattern) -> Pattern:
         corners = pattern.vertices[list(face)]
         if corner_turns(corners, pattern.face_normals[panel]).min() > COPLANAR:
             continue
-        if pattern.boards is not None:
-            raise InputError(
-                f": panel {panel} is thick and not convex; cut the thin pattern, then thicken it",
-                "pattern",
-            )
+        refuse_boards(
+            pattern, f"panel {panel} is thick and not convex; cut the thin pattern, then thicken it"
+        )
         faces[panel], *rest = _parts(face, pattern.vertices, pattern.face_normals[panel])
         more += rest
     if not more:

@@ -30,6 +30,7 @@ from scipy.sparse.linalg import splu
 from foldyn.errors import ComputationError, InputError
 from foldyn.patterns.pattern import Pattern, pattern_of
 from foldyn.patterns.topology import Edge, around, edge_of
+from foldyn.patterns.transforms import refuse_boards
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -209,8 +210,7 @@ def flat_foldable(pattern: Pattern) -> Pattern:
     0.0004
     """
     pattern = pattern_of(pattern)
-    if pattern.boards is not None:
-        raise InputError(": has thick panels; move the vertices of the thin pattern", "pattern")
+    refuse_boards(pattern, "has thick panels; move the vertices of the thin pattern")
     height = float(np.ptp(pattern.vertices[:, 2]))
     if height > _PLANE * pattern.size or (np.abs(pattern.dihedrals - np.pi) > EXACT).any():
         raise InputError(": is folded; mend the flat drawing, and fold that", "pattern")

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from foldyn.errors import InputError
 from foldyn.patterns.pattern import Pattern, Patterned, pattern_of
+from foldyn.patterns.transforms import refuse_boards
 from foldyn.values import number, numbers, show, whole
 
 
@@ -58,15 +59,14 @@ def imperfect(
     True
     """
     own = pattern_of(pattern)
-    if own.boards is not None:
-        raise InputError(": has thick panels; make it imperfect before fd.thicken", "pattern")
+    refuse_boards(own, "has thick panels; make it imperfect before fd.thicken")
     if (shapes is None) == (correlation is None):
         raise InputError(": give shapes, or the correlation of a random field", "shapes")
     if correlation is not None:
         size = number("amplitude", amplitude, least=0.0, unit="m")
         length = number("correlation", correlation, above=0.0, unit="m")
         rng = np.random.default_rng(whole("seed", seed, least=0))
-        return _displaced(own, size * _field(own, length, rng))
+        return own.changed(vertices=own.vertices + size * _field(own, length, rng))
     moved = _shapes(own, shapes, modes)
     sizes = np.asarray(numbers("amplitude", amplitude), float).ravel()
     if len(sizes) not in (1, len(moved)):
@@ -77,11 +77,7 @@ def imperfect(
     most = np.linalg.norm(moved, axis=2).max(axis=1)
     if not (most > 0.0).all():
         raise InputError(": moves no vertex; panels that buckle alone need welds inside", "shapes")
-    return _displaced(own, np.einsum("k,kni->ni", sizes / most, moved))
-
-
-def _displaced(pattern: Pattern, by: NDArray) -> Pattern:
-    return pattern.changed(vertices=pattern.vertices + by)
+    return own.changed(vertices=own.vertices + np.einsum("k,kni->ni", sizes / most, moved))
 
 
 def _shapes(pattern: Pattern, given: Any, modes: int | Sequence[int]) -> NDArray[np.float64]:

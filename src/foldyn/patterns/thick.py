@@ -30,7 +30,8 @@ from foldyn.patterns.crease_data import crease_values
 from foldyn.patterns.facets import flattened
 from foldyn.patterns.pattern import Pattern, pattern_of, refuse_junctions
 from foldyn.patterns.topology import around, edge_lookup, edge_of, walk
-from foldyn.values import SHORTEST, number, number_or_list, one_or_each, show
+from foldyn.patterns.transforms import refuse_boards
+from foldyn.values import SHORTEST, number, number_or_list, one_or_each
 
 SAME = 1e-9  # positions and heights closer than this, relative to the size, are equal
 SIDES = {"V": 0.5, "M": -0.5, "F": 0.0}  # height of a hinge line divided by the thickness
@@ -83,8 +84,7 @@ def thicken(
     [0.05, -0.05]
     """
     pattern = pattern_of(pattern)
-    if pattern.boards is not None:
-        raise InputError(": its panels are thick already; thicken the thin one", "pattern")
+    refuse_boards(pattern, "its panels are thick already; thicken the thin one")
     sizes = _thickness(thickness, pattern)
     height = _heights(offsets, sizes, pattern)
     corners = _corner_heights(height, pattern)
@@ -110,10 +110,8 @@ def thicken(
 
 def _thickness(given: Any, pattern: Pattern) -> NDArray[np.float64]:
     """Thickness of each panel (np,)."""
-    each = number_or_list("thickness", given, "panel")
+    each = number_or_list("thickness", given, "panel", above=0.0, unit="m", smallest=SHORTEST)
     sizes = one_or_each("thickness", each, len(pattern.faces), "panels")
-    if not (sizes >= SHORTEST).all():
-        raise InputError(f" = {show(given)}: must be greater than 0", "thickness")
     if len(pattern.welds):
         one, two = pattern.weld_faces[0].tolist()
         raise InputError(
@@ -206,7 +204,10 @@ def _plane(
     heights = np.array([*known.values()])
     spread = np.linalg.svd(points - points.mean(axis=0), compute_uv=False)
     if spread[-1] < SAME * span:  # collinear
-        points = np.vstack([points, _centroid(flat)])
+        import shapely  # slow to import
+
+        centroid = shapely.Polygon(flat).centroid.coords[0]
+        points = np.vstack([points, centroid])
         heights = np.append(heights, 0.0)
     system = np.column_stack([np.ones(len(points)), points / span])
     plane = np.linalg.lstsq(system, heights, rcond=None)[0]
@@ -217,13 +218,6 @@ def _plane(
             "pattern",
         )
     return np.column_stack([np.ones(len(flat)), flat / span]) @ plane
-
-
-def _centroid(x: NDArray) -> NDArray[np.float64]:
-    """Area centroid (2,) of a polygon x (k, 2)."""
-    y = np.roll(x, -1, axis=0)
-    cross = x[:, 0] * y[:, 1] - y[:, 0] * x[:, 1]
-    return ((x + y) * cross[:, None]).sum(axis=0) / (3.0 * cross.sum())
 
 
 def _shifts(height: NDArray, pattern: Pattern) -> NDArray[np.float64]:

@@ -13,14 +13,15 @@ from numpy.typing import ArrayLike, NDArray
 
 from foldyn.errors import InputError, quietly, warn
 from foldyn.patterns.boards import Boards
-from foldyn.patterns.generators.arguments import check_size
+from foldyn.patterns.generators.arguments import check_size, two_counts
 from foldyn.patterns.geometry import FaceGeometry
 from foldyn.patterns.screw import direction
 from foldyn.patterns.tiling import glue, half_edges
 from foldyn.patterns.tiling import periods as periods_of
 from foldyn.patterns.topology import Topology, around, edge_lookup, edge_of
-from foldyn.values import flag, number, numbers, show, vector, whole
+from foldyn.values import flag, number, numbers, show, vector
 
+REMEDY = "its panels are thick; repeat or join the thin pattern first"
 FLAT = 1e-6  # rad: a crease between copies within this angle from pi gets no letter
 TURNED = {"M": "V", "V": "M"}
 # Key, in a pattern's custom data, of the order of its layers, as in the FOLD format.
@@ -135,8 +136,8 @@ class Transforms(Topology, FaceGeometry):
         InputError
             No periods are found, copies do not meet along edges, or panels are thick.
         """
-        first, second = _counts(counts)
-        _thin(self)
+        first, second = two_counts("counts", counts, "numbers, as in (3, 2)")
+        refuse_boards(self)
         check_size("counts", first * second * len(self.vertices))
         near = number("tolerance", tolerance, above=0.0) * self.size
         rim = half_edges(self.faces, self.boundary)
@@ -184,8 +185,8 @@ class Transforms(Topology, FaceGeometry):
         """
         if not isinstance(other, Transforms):
             raise InputError(f" = {show(other)}: give a Pattern", "other")
-        _thin(self)
-        _thin(other)
+        refuse_boards(self)
+        refuse_boards(other)
         near = number("tolerance", tolerance, above=0.0) * max(self.size, other.size)
         zero = np.zeros(3)
         made, joined = _joined(self, [(self, zero), (other, zero)], near, flag("inner", inner))
@@ -319,17 +320,10 @@ def _given(steps: Any) -> NDArray[np.float64]:
     return array
 
 
-def _counts(counts: Any) -> tuple[int, int]:
-    try:
-        first, second = counts
-    except (TypeError, ValueError):
-        raise InputError(f" = {show(counts)}: give two numbers, as in (3, 2)", "counts") from None
-    return whole("counts[0]", first, least=1), whole("counts[1]", second, least=1)
-
-
-def _thin(pattern: Transforms) -> None:
+def refuse_boards(pattern: Transforms, why: str = REMEDY) -> None:
+    """Refuse a pattern with thick panels, with a reason and a remedy."""
     if pattern.boards is not None:
-        raise InputError(": its panels are thick; repeat or join the thin pattern first", "pattern")
+        raise InputError(f": {why}", "pattern")
 
 
 def _direction(name: str, given: Any) -> NDArray[np.float64]:

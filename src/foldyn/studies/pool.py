@@ -25,13 +25,12 @@ SETTINGS = "study_settings"
 
 
 class Task(ABC):
-    """A computation whose result is kept by `store` in a file named `name` plus `suffix`.
+    """A computation whose result is kept by `store` in a file, `name` with ".nc".
 
     A task is hashable and can be sent to another process.
     """
 
     store: ClassVar[Store[Any]]
-    suffix: ClassVar[str] = ".nc"
 
     @property
     @abstractmethod
@@ -48,7 +47,7 @@ class Task(ABC):
 
     def file(self, folder: Path) -> Path:
         """File of the result in a folder."""
-        return folder / f"{self.name}{self.suffix}"
+        return folder / f"{self.name}.nc"
 
     def result(self, folder: Path) -> Any:
         """The result in a folder; None if it is missing or was computed with other settings."""

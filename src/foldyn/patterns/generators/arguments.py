@@ -60,15 +60,20 @@ def check_size(fields: str, vertices: int) -> None:
 
 def cell_counts(cells: Any, per_cell: int) -> tuple[int, int]:
     """Return the numbers of cells along x and y of a sheet, given the vertices per cell."""
-    try:
-        if isinstance(cells, (str, bytes)):
-            raise TypeError
-        along_x, along_y = cells
-    except (TypeError, ValueError):
-        raise InputError(f" = {show(cells)}: give two integers, for x and y", "cells") from None
-    nx, ny = whole("cells[0]", along_x, least=1), whole("cells[1]", along_y, least=1)
+    nx, ny = two_counts("cells", cells, "integers, for x and y")
     check_size(f"cells = {show([nx, ny])}", per_cell * nx * ny)
     return nx, ny
+
+
+def two_counts(name: str, given: Any, what: str) -> tuple[int, int]:
+    """Return two whole numbers of at least 1; `what` says in a message what to give two of."""
+    try:
+        if isinstance(given, (str, bytes)):
+            raise TypeError
+        first, second = given
+    except (TypeError, ValueError):
+        raise InputError(f" = {show(given)}: give two {what}", name) from None
+    return whole(f"{name}[0]", first, least=1), whole(f"{name}[1]", second, least=1)
 
 
 def sizes(a: Any, b: Any) -> tuple[float, float]:

@@ -100,12 +100,9 @@ def kresling(
         for m in range(sides):
             bottom, bottom_next = r * sides + m, r * sides + (m + 1) % sides
             top, top_next = bottom + sides, bottom_next + sides
-            if mirrored:
-                faces += [(bottom, bottom_next, top), (bottom_next, top_next, top)]
-                families["diagonal"].append((bottom_next, top))
-            else:
-                faces += [(bottom, bottom_next, top_next), (bottom, top_next, top)]
-                families["diagonal"].append((bottom, top_next))
+            low, high = (bottom_next, top) if mirrored else (bottom, top_next)
+            faces += [(bottom, bottom_next, high), (low, top_next, top)]
+            families["diagonal"].append((low, high))
             families["side"].append((bottom, top))
             families["ring"].append((bottom, bottom_next))
     upward = [(m, storeys * sides + m) for m in range(sides)]

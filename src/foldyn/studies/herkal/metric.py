@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import xarray
 from numpy.typing import ArrayLike, NDArray
+from scipy.stats import spearmanr
 
 from foldyn.errors import InputError
 from foldyn.linear import mac, pair_modes
@@ -130,9 +131,7 @@ def best(values: Mapping[str, float]) -> str:
 
 def rank_correlation(a: Mapping[str, float], b: Mapping[str, float]) -> float:
     """Spearman's rank correlation of two sets of errors: 1 for equal, -1 for reverse order."""
-    first, second = ranks(a), ranks({m: b[m] for m in a})
-    n = len(first)
-    return 1.0 - 6.0 * sum((first[m] - second[m]) ** 2 for m in first) / (n * (n * n - 1))
+    return float(spearmanr([*a.values()], [b[m] for m in a]).statistic)
 
 
 @dataclass(frozen=True, eq=False)
