@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.errors import InputError
-from foldyn.statics.newton import COLLIDES, EPS, UNKNOWN, Attempt, Rule, Solver
+from foldyn.statics.newton import COLLIDES, EPS, UNKNOWN, Attempt, Rule, Solver, plane
 from foldyn.statics.stability import LostError, Section, critical_points
 from foldyn.statics.stepping import (
     PathStoppedError,
@@ -48,7 +48,7 @@ REMEDY = (
 )
 
 
-class Plane:
+def normal_plane(length: float, prediction: NDArray) -> Rule:
     """Rule of modified generalized displacement control, the method of MERLIN2, for one step.
 
     After the prediction c1 = df1 b1, with b1 the response to the load factor at the start of the
@@ -56,18 +56,10 @@ class Plane:
     long as the first step of the path, |df1| = length/|b1|, which with the first response b0 is
     the square root of the generalized stiffness parameter |b0.b0/(b1.b1)| (Leon, Lages, de Araujo
     and Paulino, Comput. Mech. 53, 2014: "modified" because the parameter and the plane use only
-    the response of the present step, not also the response of the previous step).
+    the response of the present step, not also the response of the previous step). If only part of
+    a step was taken, the motion is brought back into the plane.
     """
-
-    def __init__(self, length: float, prediction: NDArray) -> None:
-        self.prediction = prediction  # the plane passes through its end point
-
-    def __call__(self, moved: NDArray, step: NDArray, response: NDArray) -> float:
-        """Change of the load factor; nan where the plane contains the response."""
-        across = float(self.prediction @ response)
-        # if only part of a step was taken, the motion is brought back into the plane
-        short = float(self.prediction @ (moved + step)) - float(self.prediction @ self.prediction)
-        return -short / across if across != 0.0 else math.nan
+    return plane(prediction, float(prediction @ prediction))
 
 
 class Cylinder:
@@ -236,7 +228,7 @@ class PathMethod(NamedTuple):
 METHODS: Mapping[str, PathMethod] = {
     "newton": PathMethod("newton", None, False),
     "displacement": PathMethod("displacement", None, True),
-    "mgdcm": PathMethod("mgdcm", Plane, True),
+    "mgdcm": PathMethod("mgdcm", normal_plane, True),
     "arc_length": PathMethod("arc_length", Cylinder, True),
 }
 

@@ -411,14 +411,12 @@ def path_of(pattern: Pattern, energy: FoldEnergy, way: ways.Way) -> xarray.Datas
     for shape in way.shapes:
         place = placed(energy.place(shape.x), place)
         positions.append(place)
-    strain = [ways.largest_strain(shape) for shape in way.shapes]
-    bend = [energy.bent(shape.turns).max(initial=0.0) for shape in way.shapes]
     values = {
         "displacement": np.array(positions) - pattern.vertices,
         "position": positions,
         "fold_angle": [energy.creases(shape.turns) for shape in way.shapes],
-        "strain": strain,
-        "bend": bend,
+        "strain": [ways.largest_strain(shape) for shape in way.shapes],
+        "bend": [energy.bent(shape.turns).max(initial=0.0) for shape in way.shapes],
     }
     return folding_dataset(pattern, way.shares, values, {"started_from": way.origin})
 

@@ -66,14 +66,13 @@ class LayerConstraints(NamedTuple):
         Panels that overlap, the lower number first.
     products : list of (tuple of int, int)
         Rows of `pairs`, and the product of their orders.
-    triples, turns : (t, 3)
-        Three rows of `pairs` each, and the signs with which their orders must not all be equal.
+    triples : (t, 3)
+        Rows of the pairs (a, b), (b, c) and (a, c) of three panels that share an area.
     """
 
     pairs: NDArray[np.int64]
     products: list[tuple[tuple[int, ...], int]]
     triples: NDArray[np.int64]
-    turns: NDArray[np.int64]
 
 
 def layer_constraints(pattern: Pattern, state: FlatState) -> LayerConstraints:
@@ -125,8 +124,7 @@ def layer_constraints(pattern: Pattern, state: FlatState) -> LayerConstraints:
             if side[e, 0] != way * side[f, 0]:
                 c, d = d, c
             multiplied([(a, c), (b, d)], 1)
-    triples = _triples(pairs, common, inside, row)
-    return LayerConstraints(pairs, products, triples, np.tile([1, 1, -1], (len(triples), 1)))
+    return LayerConstraints(pairs, products, _triples(pairs, common, inside, row))
 
 
 def _overlaps(inside: NDArray, near: float) -> tuple[NDArray[np.int64], NDArray]:
@@ -334,11 +332,7 @@ class _Search:
         # a condition: rows, and the product (an int) or the signs (a tuple) that must not be equal
         self.conditions: list[tuple[tuple[int, ...], int | tuple[int, ...]]] = [
             *constraints.products,
-            *zip(
-                map(tuple, constraints.triples.tolist()),
-                map(tuple, constraints.turns.tolist()),
-                strict=True,
-            ),
+            *((tuple(rows), (1, 1, -1)) for rows in constraints.triples.tolist()),
         ]
         self.of_row: list[list[int]] = [[] for _ in self.orders]
         for k, (rows, _) in enumerate(self.conditions):
