@@ -15,12 +15,13 @@ position only the hinges are integrated: bar forces are accurate there for small
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.mechanics.assembly import Assembly
-from foldyn.periodic.balance import Balance
+from foldyn.periodic.balance import Balance, Converged, newton
 from foldyn.periodic.equation import EPS, Equation, Instants
 from foldyn.periodic.orbit import Orbit
 
@@ -159,6 +160,11 @@ class Family:
             for x, omega, level in (self.own(z, p + PROBE), self.own(z, p - PROBE))
         )
         return (up - down).ravel() / (2.0 * PROBE)
+
+    def solved(self, z: NDArray, p: float) -> Converged | None:
+        """Unknowns of the motion at a parameter p near unknowns z; see `newton`."""
+        residual, jacobian = partial(self.residual, p=p), partial(self.jacobian, p=p)
+        return newton(residual, jacobian, z, self.tolerance, self.rounding)
 
     def orbit(self, z: NDArray, p: float) -> Orbit:
         """The periodic motion at unknowns z and parameter p."""

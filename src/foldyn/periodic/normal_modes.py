@@ -12,7 +12,6 @@ import xarray
 from numpy.typing import NDArray
 
 from foldyn.cases import Case, State
-from foldyn.cases.contact_checks import check_contact
 from foldyn.dynamics import Progress
 from foldyn.dynamics.progress import Reporter, reported
 from foldyn.errors import ComputationError, InputError, MotionInterrupted, warn
@@ -176,7 +175,12 @@ def backbone(
             orbits = [_sharpened(family, orbit) for orbit in orbits]
             values = _values(orbits, place)
         else:
-            values = _damped_values(orbits)
+            floquet = np.array([orbit.multipliers(STEPS) for orbit in orbits])
+            values = {
+                "level": np.array([orbit.level for orbit in orbits]),
+                "floquet": floquet,
+                "stable": np.array([is_stable(row) for row in floquet]),
+            }
         values |= along(orbits)
         values["frequency"] = np.array([orbit.omega / TURN for orbit in orbits])
         values["amplitude"] = np.array([_largest(orbit, place) for orbit in orbits])
@@ -196,9 +200,7 @@ def _mode(equation: Equation, state: Any, mode: int) -> tuple[NDArray, float, ND
         displacement = equilibrium(case)
     else:
         displacement = displacement_of(state, case, "state", "a State, as fd.initial_state(path)")
-    at = equation.at(np.zeros(1), 0.0)
-    check_contact(case, displacement, at.planes[0])
-    place = equation.unknowns(displacement[None], at)[0]
+    at, place = equation.undriven(displacement)
     stiffness = _settled(equation, at, place)
     if mode > equation.heavy:
         raise InputError(f" = {mode}: there are {equation.heavy} modes", "mode")
@@ -349,16 +351,6 @@ def _values(orbits: list[Orbit], place: NDArray) -> dict[str, Any]:
             "nonlinear-vibration.md#backbones",
         )
     return {"energy": energies[:, 0], "energy_drift": energies[:, 1]}
-
-
-def _damped_values(orbits: list[Orbit]) -> dict[str, Any]:
-    """Levels, multipliers and stability of motions in phase resonance."""
-    floquet = np.array([orbit.multipliers(STEPS) for orbit in orbits])
-    return {
-        "level": np.array([orbit.level for orbit in orbits]),
-        "floquet": floquet,
-        "stable": np.array([is_stable(row) for row in floquet]),
-    }
 
 
 def _energy(orbit: Orbit, place: NDArray) -> tuple[float, float]:

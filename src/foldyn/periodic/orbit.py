@@ -174,8 +174,6 @@ class Shooting:
         Periods of the drive in one period of the motion.
     """
 
-    rounding = 0.0
-
     def __init__(
         self, equation: Equation, omega: float, steps: int, multiple: int = 1, level: float = 1.0
     ) -> None:

@@ -211,10 +211,7 @@ class _Tracer:
     def first(self, family: Any, guess: Any) -> Point:
         """Point at the first end of the range, with the tangent toward the second."""
         balance, p = family.balance, self.ends[0]
-        if self.by == "frequencies":
-            omega, level = 2.0 * np.pi * p, 1.0
-        else:
-            omega, level = family.omega, p
+        _, omega, level = family.own(np.zeros(balance.shape).ravel(), p)
         x = coefficients(balance, guess, omega, level)
         z = balanced(balance, x, omega, self.tolerance, level).x
         ahead = np.append(np.zeros(len(z)), np.sign(self.ends[1] - self.ends[0]))
