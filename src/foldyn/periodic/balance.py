@@ -64,9 +64,8 @@ class Fourier:
     @cached_property
     def order(self) -> NDArray:
         """Harmonic (c,) of each coefficient."""
-        if self.even:
-            return np.arange(self.harmonics + 1)
-        return np.concatenate([[0], np.repeat(np.arange(1, self.harmonics + 1), 2)])
+        number = np.arange(self.count)
+        return number if self.even else (number + 1) // 2
 
     @cached_property
     def phase(self) -> NDArray:
@@ -77,10 +76,9 @@ class Fourier:
     def at(self, phase: NDArray) -> NDArray:
         """Value (s, c) of each function of the series at phases (s,)."""
         angle = np.multiply.outer(phase, self.order)
-        if self.even:
-            return np.cos(angle)
         out = np.cos(angle)
-        out[:, 2::2] = np.sin(angle[:, 2::2])
+        if not self.even:
+            out[:, 2::2] = np.sin(angle[:, 2::2])
         return out
 
     @cached_property

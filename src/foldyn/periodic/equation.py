@@ -216,11 +216,6 @@ class Drive:
         self.frequency = lowest_frequency(found)
         self.highest = round(max(found) / self.frequency) if found else 0
 
-    @property
-    def varies(self) -> bool:
-        """Whether anything drives the case."""
-        return self.frequency > 0.0
-
     def factors(self, terms: Terms, phase: NDArray, level: float) -> NDArray:
         """Factors of k terms and first two derivatives of the factors (3, s, k), at phases (s,)."""
         out = np.zeros((3, len(phase), len(terms)))
@@ -363,8 +358,11 @@ class Equation:
         return dofs[:, : nodes.size].reshape(-1, *nodes.shape)
 
     def unknowns(self, displacement: NDArray, instants: Instants) -> NDArray:
-        """Unknowns (s, k) of displacements (s, n, 3) of all nodes at some instants."""
-        return self.coordinates(instants.balanced(displacement), instants)
+        """Unknowns (s, k) of displacements (s, n, 3) of all nodes; other dofs are in balance."""
+        following, none = self._following, np.zeros(self.body.size)
+        each = zip(displacement, instants.bodies, instants._factor, strict=True)
+        dofs = [body.dofs(u, following_force(following, none, factor)) for u, body, factor in each]
+        return self.coordinates(np.array(dofs), instants)
 
     def coordinates(self, dofs: NDArray, instants: Instants) -> NDArray:
         """Unknowns (s, k) of displacements (s, m) of all dofs at some instants."""
@@ -411,16 +409,6 @@ class Instants:
     def displacements(self, x: NDArray) -> NDArray:
         """Displacements of all dofs (s, m), m, from unknowns (s, k)."""
         return x @ self.equation.basis.T + self.moved + self.equation.offset
-
-    def balanced(self, displacement: NDArray) -> NDArray:
-        """Displacements (s, m) of all dofs, of those of nodes (s, n, 3); others are in balance."""
-        following, none = self.equation._following, np.zeros(self.moved.shape[1])
-        return np.array(
-            [
-                body.dofs(u, following_force(following, none, factor))
-                for u, body, factor in zip(displacement, self.bodies, self._factor, strict=True)
-            ]
-        )
 
     def _each(self, x: NDArray):
         """Yield the number, the displacement and the body of each instant."""

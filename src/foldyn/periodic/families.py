@@ -150,11 +150,10 @@ class Family:
         return self.balance.jacobian(*self.at(z, p))
 
     def slope(self, z: NDArray, p: float) -> NDArray:
-        """Derivative (n,) of R with respect to p: differences, exact for loads linear in p."""
-        return self.by_level(z, p)
+        """Derivative (n,) of R with respect to p: differences, exact for loads linear in p.
 
-    def by_level(self, z: NDArray, p: float) -> NDArray:
-        """Derivative (c k,) of the balance with respect to p through the level, by differences."""
+        It is the derivative of the balance through the level.
+        """
         up, down = (
             self.balance.residual(x, omega, self.balance.instants(level))
             for x, omega, level in (self.own(z, p + PROBE), self.own(z, p - PROBE))
@@ -285,4 +284,4 @@ class InResonance(Family):
 
     def slope(self, z: NDArray, p: float) -> NDArray:
         """Derivative (n,) of R with respect to p."""
-        return np.append(self.by_level(z, p), 0.0)
+        return np.append(super().slope(z, p), 0.0)

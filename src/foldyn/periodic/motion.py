@@ -184,7 +184,7 @@ def balance_of(
     """
     harmonics = whole("harmonics", harmonics, least=1)
     equation = Equation(case, name, driven, origin_of(case, guess) if driven else None)
-    if driven and not equation.drive.varies:
+    if driven and not equation.drive.frequency:
         raise InputError(
             f"case: nothing drives it: {name} follows the period of a load or support; give one "
             f"the history {HARMONIC}"
@@ -290,6 +290,13 @@ def equilibrium(case: Case) -> NDArray:
     return trace(still, "newton", load_factors=[0.0, 1.0])["displacement"].values[-1]
 
 
+def place_of(case: Case, state: Any, field: str, expected: str) -> NDArray:
+    """Displacement (n, 3), m, of a state, or of the equilibrium if none is given."""
+    if state is None:
+        return equilibrium(case)
+    return displacement_of(state, case, field, expected)
+
+
 def origin_of(case: Case, guess: Any) -> Origin | None:
     """State about which damping with ``state = "initial"`` is taken; None without such damping.
 
@@ -308,10 +315,7 @@ def coefficients(balance: Balance, guess: Any, omega: float, level: float = 1.0)
     equation = balance.equation
     if isinstance(guess, xarray.Dataset):
         return _of_result(balance, guess, level)
-    if guess is None:
-        place = equilibrium(equation.case)
-    else:
-        place = displacement_of(guess, equation.case, "guess", PLACES)
+    place = place_of(equation.case, guess, "guess", PLACES)
     x = np.zeros(balance.shape)
     x[0] = equation.undriven(place)[1]
     return x + linear_response(balance, x, omega, level)

@@ -23,14 +23,13 @@ from foldyn.periodic.motion import (
     FLOOR,
     balance_of,
     balanced,
-    equilibrium,
     linear_response,
+    place_of,
     warn_of_errors,
 )
 from foldyn.periodic.orbit import SHOWN, STEPS, Orbit, along, is_stable
 from foldyn.ram_limit import check_memory
 from foldyn.results.dataset import points_dataset
-from foldyn.statics.tracing import displacement_of
 from foldyn.values import flag, number, numbers, of_kind, show, whole
 
 FIRST = 0.3  # length of the first step, relative to the longest step
@@ -196,18 +195,14 @@ def backbone(
 def _mode(equation: Equation, state: Any, mode: int) -> tuple[NDArray, float, NDArray]:
     """Equilibrium (k,), and frequency (Hz) and shape (k,) of a mode; some node moves by 1."""
     case = equation.case
-    if state is None:
-        displacement = equilibrium(case)
-    else:
-        displacement = displacement_of(state, case, "state", "a State, as fd.initial_state(path)")
+    displacement = place_of(case, state, "state", "a State, as fd.initial_state(path)")
     at, place = equation.undriven(displacement)
     stiffness = _settled(equation, at, place)
     if mode > equation.heavy:
         raise InputError(f" = {mode}: there are {equation.heavy} modes", "mode")
-    soft = equation.body.sheet.soft_hinges(at.displacements(place[None])[0])
-    if len(soft.offset):  # laws with zero slope at rest
-        floored = equation.body.tangent(at.displacements(place[None])[0], FLOOR)
-        stiffness = equation.projected(floored)
+    u = at.displacements(place[None])[0]
+    if len(equation.body.sheet.soft_hinges(u).offset):  # laws with zero slope at rest
+        stiffness = equation.projected(equation.body.tangent(u, FLOOR))
     value, vector = equation.vibrations(stiffness, mode - 1, mode - 1)
     if not value[0] > 0.0:
         raise ComputationError(

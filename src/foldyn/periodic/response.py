@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -53,15 +52,14 @@ SURE = {FOLD: 1e-6, PITCHFORK: 1e-3, DOUBLING: 1e-3, TORUS: 1e-3}
 REAL = 1e-9  # largest imaginary part of a real multiplier
 
 
-@dataclass(eq=False)
-class _Found:
+class _Found(NamedTuple):
     """A recorded point of the curve."""
 
     family: Any
     point: Point
     branch: int
-    bifurcation: str = ""
-    floquet: NDArray = field(default_factory=lambda: np.zeros(0))
+    bifurcation: str
+    floquet: NDArray
 
 
 def response_curve(

@@ -62,24 +62,20 @@ def normal_plane(length: float, prediction: NDArray) -> Rule:
     return plane(prediction, float(prediction @ prediction))
 
 
-class Cylinder:
+def cylinder(length: float, prediction: NDArray) -> Rule:
     """Rule of the cylindrical arc length for one step: it fixes the distance from start to end.
 
     With c the motion since the start of the step, a the step of Newton's method at the present
     load factor and b the response to the factor, |c + a + df b| = length is a quadratic equation
     for df (Crisfield, Computers and Structures 13, 1981). The rule takes the root that
-    continues in the direction of the step.
+    continues in the direction of the step, or nan where the arc does not meet the linearized path.
     """
 
-    def __init__(self, length: float, prediction: NDArray) -> None:
-        self.length, self.prediction = length, prediction
-
-    def __call__(self, moved: NDArray, step: NDArray, response: NDArray) -> float:
-        """Change of the load factor; nan where the arc does not meet the linearized path."""
+    def change(moved: NDArray, step: NDArray, response: NDArray) -> float:
         reached = moved + step
         a = float(response @ response)
         b = float(response @ reached)
-        c = float(reached @ reached) - self.length**2
+        c = float(reached @ reached) - length**2
         root = b * b - a * c
         if not root >= 0.0 or a == 0.0:
             return math.nan
@@ -87,8 +83,10 @@ class Cylinder:
         # without cancellation: one root from a sum of two terms of equal sign, the other by Vieta
         far = -(b + math.copysign(root, b))
         roots = (far / a, c / far if far != 0.0 else 0.0)
-        along = [float((reached + root * response) @ self.prediction) for root in roots]
+        along = [float((reached + root * response) @ prediction) for root in roots]
         return roots[int(np.argmax(along))]
+
+    return change
 
 
 def follow(
@@ -101,7 +99,7 @@ def follow(
     solver, start
         Solver, and the station where the path begins.
     rule : ArcRule
-        Rule of the method, such as `Cylinder`.
+        Rule of the method, such as `cylinder`.
     first_step : float
         Change of the load factor in the first step; it sets the length of the following steps.
     direction : (m,) or None
@@ -229,7 +227,7 @@ METHODS: Mapping[str, PathMethod] = {
     "newton": PathMethod("newton", None, False),
     "displacement": PathMethod("displacement", None, True),
     "mgdcm": PathMethod("mgdcm", normal_plane, True),
-    "arc_length": PathMethod("arc_length", Cylinder, True),
+    "arc_length": PathMethod("arc_length", cylinder, True),
 }
 
 

@@ -305,10 +305,8 @@ def _best_way(
         stiffest, *others = bending.folding
         best = ways.from_pattern(energy, stiffest, targets, steps, tell)
         for softer in others:
-            if (
-                any(cost(best)[:3])
-                or energy.bent(best.shapes[-1].turns).max(initial=0.0) > ways.SLIGHT
-            ):
+            bend = energy.bent(best.shapes[-1].turns).max(initial=0.0)
+            if any(cost(best)[:3]) or bend > ways.SLIGHT:
                 best = min(best, ways.from_pattern(energy, softer, targets, steps, tell), key=cost)
         if initial == "pattern" or not any(cost(best)[:3]):
             return best

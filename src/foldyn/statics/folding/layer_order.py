@@ -135,9 +135,7 @@ def _overlaps(inside: NDArray, near: float) -> tuple[NDArray[np.int64], NDArray]
     one, other = one[order], other[order]
     # on a grid: else the overlay finds nothing for panels that differ by round-off alone
     grid = GRID * near
-    common = np.asarray(shapely.intersection(inside[one], inside[other], grid_size=grid)).reshape(
-        -1
-    )
+    common = np.ravel(shapely.intersection(inside[one], inside[other], grid_size=grid))
     kept = shapely.area(common) > near**2
     return np.stack([one, other], axis=1)[kept].astype(np.int64), common[kept]
 
@@ -205,12 +203,9 @@ def flat_state(pattern: Pattern, angles: NDArray, closed: float) -> FlatState | 
     if ((size > math.pi - closed) & (size < closed)).any() or not (size >= closed).any():
         return None
     points, near = _flattened(pattern)
-    areas = []
-    for face in pattern.faces:
-        a, b = points[list(face)].T
-        areas.append(float(a @ np.roll(b, -1) - b @ np.roll(a, -1)))
+    up = [shapely.LinearRing(points[list(face)]).is_ccw for face in pattern.faces]
     signs = np.where(size >= closed, np.sign(angles), 0.0).astype(np.int64)
-    return FlatState(points, np.array(areas) > 0.0, signs, near)
+    return FlatState(points, np.array(up), signs, near)
 
 
 def _flattened(pattern: Pattern) -> tuple[NDArray, float]:
