@@ -9,12 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from problem import Problem
 
-KINDS = {
-    "C++": 0,
-    "C++ from lengths": 1,
-    "C++ AVX-512": 2,
-    "C++ AVX-512 from lengths": 3,
-}
+KINDS = {"C++": 0, "C++ from lengths": 1, "C++ AVX-512": 2, "C++ AVX-512 from lengths": 3}
 _doubles, _indices = POINTER(c_double), POINTER(c_uint32)
 
 

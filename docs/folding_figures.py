@@ -26,10 +26,7 @@ PATTERNS = {
     "waterbomb": (fd.read_pattern(FILES / "waterbomb.fold"), 0.6),
     "Resch": (fd.read_pattern(FILES / "resch.fold"), 0.95),
     "square twist": (fd.read_pattern(FILES / "square-twist.fold"), 0.7),
-    BENDS: (
-        fd.patterns.square_twist(panel_angle=60, dihedral=180, symmetric=True),
-        0.5,
-    ),
+    BENDS: (fd.patterns.square_twist(panel_angle=60, dihedral=180, symmetric=True), 0.5),
     "bird base": (fd.read_pattern(FILES / "bird-base.fold"), 0.8),
 }
 """Flat patterns, and how far they are folded."""

@@ -10,11 +10,7 @@ pattern = fd.patterns.miura(cells=(2, 2), a=0.25, b=0.25, panel_angle=60, dihedr
 laws = {"fold_law": "linear", "bend_law": "linear", "crease_stiffness": 0.01}
 structure = fd.discretize(pattern, foam, **laws)
 unfold = fd.Actuate("all", angle=110.0)  # at once
-fluids = {
-    "vacuum": None,
-    "air, drag alone": fd.Air(added_mass=False),
-    "air": fd.Air(resolution=2),
-}
+fluids = {"vacuum": None, "air, drag alone": fd.Air(added_mass=False), "air": fd.Air(resolution=2)}
 motions = {}
 figure, axes = plt.subplots(figsize=(6.5, 4.0), layout="constrained")
 for name, fluid in fluids.items():

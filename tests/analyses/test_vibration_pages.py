@@ -15,8 +15,7 @@ from foldyn.plots.frf import curves_of
 from foldyn.plots.readings import chosen_modes
 
 SHEET = changed(
-    HELD_MIURA_TEXT,
-    "pattern.cells = [2, 1]; pattern.dihedral = 90; damping.alpha = 0.5",
+    HELD_MIURA_TEXT, "pattern.cells = [2, 1]; pattern.dihedral = 90; damping.alpha = 0.5"
 )
 PUSH = '[[drive]]\nnodes = "xmax"\nforce = [0, 0, 1e-4]\n'
 

@@ -41,9 +41,7 @@ def heave(structure, resolution):
 
 # ------------------------------------------------------------------ published values
 @pytest.mark.parametrize(
-    ("ratio", "published"),
-    [(1.0, 0.579), (2.0, 0.757)],
-    ids=["square", "twice as long"],
+    ("ratio", "published"), [(1.0, 0.579), (2.0, 0.757)], ids=["square", "twice as long"]
 )
 def test_rectangles_have_the_published_mass_with_400_elements(ratio, published):
     """rho pi/4 a^2 b times 0.579 and 0.757 (DNV-RP-C205, appendix D, rectangular plates)."""

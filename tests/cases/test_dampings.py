@@ -110,11 +110,7 @@ direction = "-x"
         ("[damping]", "creases = [99]", r"damping.creases = \[99\]: must be a number"),
         ("[damping]", "creases = { coefficient = 1, creases = [99] }", "crease 99 is out of range"),
         ("[damping]", "creases = [{ coefficient = 1 }, {}]", r"\[1\].coefficient: missing"),
-        (
-            "[[supports]]",
-            "between = [0, 8]",
-            r"\[1\].stiffness: missing; give it",
-        ),
+        ("[[supports]]", "between = [0, 8]", r"\[1\].stiffness: missing; give it"),
         ("[[supports]]", "dashpot = 1", r"supports\[1\].nodes: give either nodes"),
         ("[[supports]]", "dashpot = 1\nnodes = [1]\nbetween = [1, 2]", "between: give either"),
         ("[[supports]]", "dashpot = 1\nbetween = [1]", r"between = \[1\]: must be two nodes"),

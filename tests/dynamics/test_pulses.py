@@ -108,10 +108,7 @@ def test_random_pulses_on_a_moving_oscillator(method):
 @pytest.mark.matrix
 @pytest.mark.parametrize(
     ("kind", "method"),
-    [
-        *(("bars", name) for name in METHODS),
-        *beyond([("shell", name) for name in SHELLS], 3),
-    ],
+    [*(("bars", name) for name in METHODS), *beyond([("shell", name) for name in SHELLS], 3)],
 )
 def test_the_impulse_arrives_on_a_free_sheet(kind, method):
     """Momentum after the pulse = the pulse's integral, whatever bends and swings meanwhile."""

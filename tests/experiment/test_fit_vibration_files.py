@@ -10,12 +10,7 @@ from test_fit_vibrations import FREE, FRF, LINES, MODES
 
 import foldyn as fd
 from foldyn.errors import InputError
-from foldyn.experiment import (
-    DampingRatios,
-    FrequencyResponse,
-    ModeShapes,
-    NaturalFrequencies,
-)
+from foldyn.experiment import DampingRatios, FrequencyResponse, ModeShapes, NaturalFrequencies
 from foldyn.experiment.calibration.fit_file import read_fit
 from foldyn.experiment.calibration.fit_page import write_fit
 from foldyn.experiment.calibration.measured_files import recognize

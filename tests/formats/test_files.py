@@ -22,11 +22,7 @@ UNKNOWN = r"known ones are .*\.fold"
 @pytest.mark.parametrize(
     ("name", "reading", "writing"),
     [
-        (
-            "none/x.fold",
-            r"x\.fold: there is no such file",
-            r"cannot be written.*directory exists",
-        ),
+        ("none/x.fold", r"x\.fold: there is no such file", r"cannot be written.*directory exists"),
         ("dir.fold", r"dir\.fold: is a directory", r"dir\.fold: is a directory"),
         ("dir", "dir: is a directory", "dir: is a directory"),
         ("x.dwg", UNKNOWN, UNKNOWN),

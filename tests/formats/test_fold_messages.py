@@ -34,14 +34,8 @@ BAD_FIELDS = [
         {"faces_vertices": [[0, 1, 9]]},
         r"faces_vertices\[0\] = \[0, 1, 9\]: give at least three vertex numbers from 0 to 5",
     ),
-    (
-        {"faces_vertices": [[0, 1, 1.5]]},
-        r"faces_vertices\[0\] = \[0, 1, 1.5\]: give",
-    ),
-    (
-        {"faces_vertices": [[0, 1, None]]},
-        r"faces_vertices\[0\] = \[0, 1, None\]: give",
-    ),
+    ({"faces_vertices": [[0, 1, 1.5]]}, r"faces_vertices\[0\] = \[0, 1, 1.5\]: give"),
+    ({"faces_vertices": [[0, 1, None]]}, r"faces_vertices\[0\] = \[0, 1, None\]: give"),
     ({"faces_vertices": [[0, 1, 2]]}, r"faces\[0\].*has no area"),
     ({"drop": ["edges_vertices"]}, "edges_vertices is missing"),
     ({"edges_assignment": ["V"]}, "edges_assignment has 1 entries for 3 in edges_vertices"),

@@ -34,10 +34,7 @@ def build(preset: Any) -> Any:
 @pytest.mark.parametrize("preset", PRESETS)
 @pytest.mark.parametrize(
     ("measures", "closely"),
-    [
-        (["frequency[1]", "frequency[3]", "damping_ratio[2]"], 1e-6),
-        (["effective_mass[2,z]"], 1e-5),
-    ],
+    [(["frequency[1]", "frequency[3]", "damping_ratio[2]"], 1e-6), (["effective_mass[2,z]"], 1e-5)],
 )
 def test_gradients_agree_with_differences(preset, measures, closely):
     stiffness = np.random.default_rng(1).uniform(0.01, 0.03, 4)

@@ -149,10 +149,7 @@ def test_the_length_to_which_a_bar_is_cut():
 # ------------------------------------------------------------------ what has none
 @pytest.mark.parametrize(
     ("changes", "told"),
-    [
-        ({"method": "dormand_prince", "dt": None}, "rk4"),
-        ({"method": "energy_momentum"}, "rk4"),
-    ],
+    [({"method": "dormand_prince", "dt": None}, "rk4"), ({"method": "energy_momentum"}, "rk4")],
 )
 def test_methods_without_gradients(changes, told):
     with pytest.raises(InputError, match=told):

@@ -22,14 +22,8 @@ from pairwise import beyond
 FILES = [  # kernels for GPUs are not kept, and import what is optional
     path for path in sorted(PACKAGE.rglob("*.py")) if path.parent.name != "gpu"
 ]
-HALF_SINE = (
-    "s = math.sin(math.pi * t / duration)",
-    "s = 3.0 * math.sin(math.pi * t / duration)",
-)
-LAW = (
-    "def moment(turn):",
-    "def moment(turn):\n    return 7.0\n\n\ndef was(turn):",
-)
+HALF_SINE = ("s = math.sin(math.pi * t / duration)", "s = 3.0 * math.sin(math.pi * t / duration)")
+LAW = ("def moment(turn):", "def moment(turn):\n    return 7.0\n\n\ndef was(turn):")
 
 
 @cache

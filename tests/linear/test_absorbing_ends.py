@@ -56,10 +56,7 @@ def reflected():
     times = np.linspace(0.0, period, 101)
     push = fd.Table(times, 0.5 * (1.0 - np.cos(2.0 * np.pi * times / period)))
     chain = UNIT.chain(CELLS)
-    ends = {
-        "absorbing": absorbing_end(chain, END, waves=waves),
-        "free": [],
-    }
+    ends = {"absorbing": absorbing_end(chain, END, waves=waves), "free": []}
     found = {}
     for name, end in ends.items():
         case = fd.Case(

@@ -160,8 +160,7 @@ def test_doubt_is_about_what_finer_meshes_show(frequencies):
 
 @pytest.mark.matrix
 @pytest.mark.parametrize(
-    ("radius", "divisions"),
-    [(None, (4, 8)), pytest.param(2e-3, (8, 12), marks=pytest.mark.matrix)],
+    ("radius", "divisions"), [(None, (4, 8)), pytest.param(2e-3, (8, 12), marks=pytest.mark.matrix)]
 )
 def test_a_panel_that_touches_a_clamp_has_no_limit(radius, divisions):
     """Even meshes settle too slowly, and with a radius they agree on what depends on it."""

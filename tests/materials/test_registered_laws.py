@@ -13,15 +13,7 @@ from custom_laws import CUBIC
 from foldyn.errors import InputError
 from foldyn.jit.compiled import kernel, scalar
 from foldyn.jit.switches import by_code
-from foldyn.materials import (
-    BAR_LAWS,
-    HINGE_LAWS,
-    BarLaw,
-    HingeLaw,
-    LinearHinge,
-    bar_law,
-    hinge_law,
-)
+from foldyn.materials import BAR_LAWS, HINGE_LAWS, BarLaw, HingeLaw, LinearHinge, bar_law, hinge_law
 from foldyn.materials.formulas import HingeFormulas
 from foldyn.materials.switch import move_rest
 from named_models import named

@@ -19,11 +19,7 @@ from foldyn.jit.compiled import kernel
 from foldyn.jit.context import Context, numbers_at, rows_at, run_at
 from foldyn.mechanics import angles
 from foldyn.mechanics.assembly import Assembly
-from foldyn.mechanics.discrete_gradient import (
-    discrete_gradient,
-    mean_moment,
-    mean_stress,
-)
+from foldyn.mechanics.discrete_gradient import discrete_gradient, mean_moment, mean_stress
 from foldyn.mechanics.inelastic import HingeMemory
 from foldyn.mechanics.mean_forces import MeanForces
 from foldyn.mechanics.term import FORCES, MEAN_FORCES, CompiledTerm, Term, forces

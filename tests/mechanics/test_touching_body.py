@@ -12,12 +12,7 @@ from foldyn.jit.compiled import kernel
 from foldyn.mechanics.contact.contact_state import memory
 from foldyn.mechanics.contact.distances import edge_gap, vertex_gap
 from foldyn.mechanics.contact.hinge_guards import add_guards
-from foldyn.mechanics.contact.search import (
-    edge_d0,
-    list_pairs,
-    panel_d0,
-    place,
-)
+from foldyn.mechanics.contact.search import edge_d0, list_pairs, panel_d0, place
 
 
 @kernel

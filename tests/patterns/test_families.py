@@ -146,11 +146,7 @@ def test_letters_and_angles_by_family_in_a_case_file(tmp_path):
     for old, new, message in (
         ('{ spine = "M" }', "{ spine = 1 }", "assignments = .*or a table by family"),
         ("{ spine = 90 }", '{ spine = "90" }', "fold_angles = .*or a table of sizes by family"),
-        (
-            '{ spine = "M" }',
-            '{ spin = "M" }',
-            "is no family; did you mean 'spine'",
-        ),
+        ('{ spine = "M" }', '{ spin = "M" }', "is no family; did you mean 'spine'"),
         ("{ spine = 90 }", "{ spine = -90 }", r"fold_angles.spine = -1.57.*: is a size"),
     ):
         path.write_text(text.replace(old, new))

@@ -290,11 +290,7 @@ STAR = [[np.cos(t), np.sin(t)] for t in 2 * np.pi * np.arange(5) * 2 / 5]
         (SQUARES, ["012"], r'faces\[0\] = "012": give'),
         (SQUARES, [[0, 1, 4.0, 3]], r"faces\[0\]: vertex number 4.0 is not an integer"),
         (SQUARES, [[0, 1, True]], "faces.*vertex number True is not an integer"),
-        (
-            SQUARES,
-            [TWO[0], [1, 2, 6]],
-            r"\[1, 2, 6\]: vertex 6 does not exist; with 6.* 5",
-        ),
+        (SQUARES, [TWO[0], [1, 2, 6]], r"\[1, 2, 6\]: vertex 6 does not exist; with 6.* 5"),
         (SQUARES, [[0, 1, -2]], "faces.*vertex -2 does not exist"),
         (SQUARES, [[0, 1]], r"faces.*at least 3 distinct vertices, this has 2"),
         (SQUARES, [[0, 1, 0, 1]], r"faces.*at least 3 distinct vertices, this has 2"),

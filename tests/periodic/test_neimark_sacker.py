@@ -10,7 +10,7 @@ from scipy.integrate import solve_ivp
 from scipy.optimize import fsolve
 
 import foldyn as fd
-from foldyn.periodic.balance import AtFrequency, newton
+from foldyn.periodic.families import ByFrequency
 from foldyn.periodic.motion import balance_of
 
 TURN = 2.0 * np.pi
@@ -114,7 +114,8 @@ def test_motions_are_those_of_pyharm():
     cosines, sines = np.split(amplitudes, [harmonics + 1], axis=2)
     theirs = cosines.astype(complex)
     theirs[:, :, 1:] -= 1j * sines
+    family = ByFrequency(balance, 1.0, 1e-9)
     for omega, both in zip(rows[:, 0], theirs, strict=True):
         x = balance.fourier.real_of(both.T)
-        found = newton(AtFrequency(balance, omega), x.ravel(), 1e-9)
+        found = family.solved(x.ravel(), omega / TURN)
         assert np.linalg.norm(found.x - x.ravel()) < 2e-9 * np.linalg.norm(x)

@@ -15,11 +15,7 @@ def made(frequency, error, limit):
     """A comparison of two models with made-up numbers."""
     sheet = fd.Sheet(1e6, 0.25, 0.01, density=1.0)
     case = fd.Case(fd.discretize(fd.patterns.simple_fold(), sheet, preset="plate"))
-    values = {
-        "frequency": frequency,
-        "error": error,
-        "mac": np.where(np.isinf(error), 0.2, 0.9),
-    }
+    values = {"frequency": frequency, "error": error, "mac": np.where(np.isinf(error), 0.2, 0.9)}
     return fd.Fidelity(
         fidelity_dataset(case, ["own", "plate"], values, {"limit": limit, "reference": "shell"})
     )

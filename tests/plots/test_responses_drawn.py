@@ -100,10 +100,7 @@ def test_labels_of_peaks_do_not_meet(case):
 
 @pytest.mark.parametrize(
     ("quantity", "factor", "unit"),
-    [
-        ("mobility", 2j * np.pi * F, "m/(N s)"),
-        ("accelerance", -((2 * np.pi * F) ** 2), "m/(N s²)"),
-    ],
+    [("mobility", 2j * np.pi * F, "m/(N s)"), ("accelerance", -((2 * np.pi * F) ** 2), "m/(N s²)")],
 )
 def test_other_quantities(response, quantity, factor, unit):
     figure = plot_frf({"one": response}, [7], axes="x", quantity=quantity)

@@ -10,12 +10,7 @@ from scipy import stats
 import foldyn as fd
 from case_texts import HELD_MIURA_TEXT, PLATE
 from foldyn.errors import InputError
-from foldyn.plots import (
-    plot_main_effects,
-    plot_sobol_indices,
-    plot_sweep_lines,
-    plot_sweep_map,
-)
+from foldyn.plots import plot_main_effects, plot_sobol_indices, plot_sweep_lines, plot_sweep_map
 from foldyn.results import main_effects, sobol_indices
 
 

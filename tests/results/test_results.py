@@ -125,10 +125,7 @@ PER_CREASE = {"crease_stiffness": np.linspace(0.1, 1 / 3, 10), "crease_rest": [1
 CHIRP = fd.Chirp(1 / 3, 20.1, 0.7, 10)
 TOWER = fd.patterns.kresling(sides=8, storeys=2)
 LETTERS = fd.Pattern(CELLS.vertices, CELLS.faces, ["U"] * 10, 'say "x"')
-LAWS = {
-    "fold_law": fd.EnhancedLinear(200 / 3, 320.1, "as_published"),
-    "bend_law": LinearHinge(),
-}
+LAWS = {"fold_law": fd.EnhancedLinear(200 / 3, 320.1, "as_published"), "bend_law": LinearHinge()}
 CENTER = CELLS.vertices[[0, 1, 3, 4]].mean(axis=0) + 1e-3
 CASES = {
     "plain": make_case(fd.Pulse(0.1)),

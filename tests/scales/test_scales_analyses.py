@@ -108,10 +108,7 @@ def moved(by):
 
 
 def relieved(by):
-    loads = [
-        fd.Force([0], (1e-3 * by.force, 0, 0)),
-        fd.Force([5], (-0.5e-3 * by.force, 0, 0)),
-    ]
+    loads = [fd.Force([0], (1e-3 * by.force, 0, 0)), fd.Force([5], (-0.5e-3 * by.force, 0, 0))]
     return fd.trace(fd.Case(fold(by), [], loads), steps=2, inertia_relief=True)
 
 

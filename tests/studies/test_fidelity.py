@@ -16,14 +16,7 @@ from foldyn.structures.beyond_range import BELOW, plate_frequency
 from pairwise import beyond
 from verification.fidelity import __main__ as command
 from verification.fidelity import independent
-from verification.fidelity.cases import (
-    FidelityCase,
-    documented,
-    drawn,
-    polygons,
-    sheets,
-    supports,
-)
+from verification.fidelity.cases import FidelityCase, documented, drawn, polygons, sheets, supports
 from verification.fidelity.compare import (
     MODELS,
     RESULTS,

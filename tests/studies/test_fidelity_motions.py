@@ -246,10 +246,7 @@ def test_why_panels_harden():
 
 
 @pytest.mark.matrix
-@pytest.mark.parametrize(
-    ("thickness", "plate", "n5b8e"),
-    [(1e-3, -0.18, -0.22), (3e-4, 0.17, 0.0)],
-)
+@pytest.mark.parametrize(("thickness", "plate", "n5b8e"), [(1e-3, -0.18, -0.22), (3e-4, 0.17, 0.0)])
 def test_towers_whose_rims_bow_in_their_plane(thickness, plate, n5b8e):
     """Thick ones are too soft: bows turn the creases, which resist that in the shell alone."""
     found = stiffness(tower(thickness, (8, 12)), "z")

@@ -71,9 +71,7 @@ def test_variants():
     case_file = runs.case_study("case2")
     given = Variant(pulse=0.1, loads="edge", bend_law="linear", calibration="merlin2")
     case = case_with(case_file, "panel", given)
-    assert [(load.history, load.nodes) for load in case.loads] == [
-        (fd.HalfSine(0.1), (6, 7, 8)),
-    ]
+    assert [(load.history, load.nodes) for load in case.loads] == [(fd.HalfSine(0.1), (6, 7, 8))]
     assert case.structure.options.bend_law == "linear"
     assert case.structure.options.calibration == "merlin2"
     assert case.structure.options.mass == "panel"

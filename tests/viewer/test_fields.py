@@ -52,10 +52,7 @@ def test_energy_lies_where_the_fold_is():
 @pytest.mark.parametrize("constant", [(), (0,)], ids=["growing", "constant"])
 def test_rest_angles_follow_what_folds_them_on_a_path(constant):
     s = structure(fold_law="linear", bend_law="linear")
-    loads = [
-        fd.Actuate("all", fraction=0.4),
-        fd.Force([s.pattern.faces[-1][2]], (0.0, 0.0, 0.02)),
-    ]
+    loads = [fd.Actuate("all", fraction=0.4), fd.Force([s.pattern.faces[-1][2]], (0.0, 0.0, 0.02))]
     path = fd.trace(fd.Case(s, SUPPORTS, loads), load_factors=[0.5, 1.0], constant=constant)
     check(s, path)
 
@@ -84,10 +81,7 @@ def test_all_models_have_energies_that_add_up_also_where_loads_fold(model):
     """Unknowns without mass stand where actuation has put them."""
     pattern = fd.patterns.miura((1, 1), 0.1, b=0.08, panel_angle=60, dihedral=90)
     s = MODELS[model](pattern, SHEET, crease_stiffness=0.3)
-    loads = [
-        fd.Actuate([0, 2], angle=140.0),
-        fd.Force([8], (0.0, 0.01, 0.02)),
-    ]
+    loads = [fd.Actuate([0, 2], angle=140.0), fd.Force([8], (0.0, 0.01, 0.02))]
     path = fd.trace(fd.Case(s, [fd.Fix(pattern.faces[0])], loads), load_factors=[0.4, 1.0])
     check(s, path)
 

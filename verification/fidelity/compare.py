@@ -13,14 +13,7 @@ import numpy as np
 
 from foldyn.condensation import superelements
 from foldyn.errors import FoldynWarning
-from foldyn.linear.reference import (
-    SPARE,
-    Reference,
-    Shown,
-    matched,
-    modes_at_rest,
-    reference_modes,
-)
+from foldyn.linear.reference import SPARE, Reference, Shown, matched, modes_at_rest, reference_modes
 from foldyn.linear.shell_of import DIVISIONS
 from foldyn.shells import shell
 from foldyn.structures import discretize

@@ -10,7 +10,7 @@ import numpy as np
 import xarray
 from numpy.typing import ArrayLike, NDArray
 
-from foldyn.attractors.drive import at_frequency, at_level, driven_frequency
+from foldyn.attractors.drive import at_frequency, at_level, drive_frequency, driven_frequency
 from foldyn.attractors.jumps import Jump, is_jump, jump_variables
 from foldyn.attractors.run import PER_PERIOD, Run, Stretch, check_measure, measured, swing
 from foldyn.cases import Case, State
@@ -128,10 +128,8 @@ def bifurcation_diagram(
     check_measure(measure, len(case.structure.nodes))
     swept = _swept(case, frequencies, amplitudes)
     choice("sweep", sweep, SWEEPS)
-    steady = Steady(
-        swept.case_at, swept.frequency_at, measure, whole("settle", settle, least=0),
-        whole("record", record, least=4),
-    )  # fmt: skip
+    settle, record = whole("settle", settle, least=0), whole("record", record, least=4)
+    steady = Steady(swept.case_at, measure, settle, record)
     resolution = number("resolution", resolution, above=0.0)
     run = Run(method, dt, tolerance, initial)
     ways = ["up", "down"] if sweep == "both" else [sweep]
@@ -184,19 +182,18 @@ class Swept(NamedTuple):
     quantity: Quantity
     values: NDArray[np.float64]
     case_at: Callable[[float], Case]
-    frequency_at: Callable[[float], float]  # Hz, of the drive
 
 
 def _swept(case: Case, frequencies: ArrayLike | None, amplitudes: ArrayLike | None) -> Swept:
     """The swept parameter, from the arguments `frequencies` and `amplitudes`."""
     if (frequencies is None) == (amplitudes is None):
         raise InputError(": give frequencies (Hz) or amplitudes, one of the two", "frequencies")
-    own = driven_frequency(case, "fd.bifurcation_diagram")
+    driven_frequency(case, "fd.bifurcation_diagram")
     by, given = ("frequencies", frequencies) if amplitudes is None else ("amplitudes", amplitudes)
     values = increasing(by, given, above=0.0)
     if amplitudes is None:
-        return Swept("frequency", FREQUENCY, values, lambda f: at_frequency(case, f), lambda f: f)
-    return Swept("level", LEVEL, values, lambda level: at_level(case, level), lambda _: own)
+        return Swept("frequency", FREQUENCY, values, lambda f: at_frequency(case, f))
+    return Swept("level", LEVEL, values, lambda level: at_level(case, level))
 
 
 class Point(NamedTuple):
@@ -213,7 +210,6 @@ class Steady(NamedTuple):
     """Finds steady motions."""
 
     case_at: Callable[[float], Case]
-    frequency_at: Callable[[float], float]
     measure: Quantity
     settle: int
     record: int
@@ -223,7 +219,8 @@ class Steady(NamedTuple):
 
         begun : time (s) since the current period of the drive began.
         """
-        case, period = self.case_at(value), 1.0 / self.frequency_at(value)
+        case = self.case_at(value)
+        period = 1.0 / drive_frequency(case)
         interval, transient = period / PER_PERIOD, self.settle * period
         if self.settle:
             left = transient - begun

@@ -103,7 +103,7 @@ def check_relaxing(case: Case, why: str) -> None:
         )
 
 
-def check_measure(measure: Any, nodes: int, name: str = "measure") -> Quantity:
+def check_measure(measure: Any, nodes: int, name: str = "measure") -> None:
     """Refuse a measure that does not return a number in the rest state."""
     of_kind(name, measure, Quantity)
     if measure.function is None or measure.dims:
@@ -112,7 +112,6 @@ def check_measure(measure: Any, nodes: int, name: str = "measure") -> Quantity:
         )
     rest = np.zeros((1, nodes, 3))
     measured(measure, Stretch(np.zeros(1), rest, rest.copy()), name)
-    return measure
 
 
 def measured(measure: Quantity, stretch: Stretch, name: str = "measure") -> NDArray[np.float64]:

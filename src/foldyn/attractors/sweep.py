@@ -6,6 +6,7 @@ import math
 import time
 from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -220,10 +221,8 @@ class Glide(NamedTuple):
         The sweep passes a fold before it jumps, so the steps begin earlier, at a frequency at which
         the motion keeps its amplitude if the frequency is held.
         """
-        steady = Steady(
-            lambda f: at_frequency(self.case, f), lambda f: f, self.measure,
-            max(self.settle, HELD), FEWEST_RECORDED,
-        )  # fmt: skip
+        held = max(self.settle, HELD)
+        steady = Steady(partial(at_frequency, self.case), self.measure, held, FEWEST_RECORDED)
         last = first = int(np.argmin(np.abs(self.rates - jump.place)))
         back = 0.0
         try:

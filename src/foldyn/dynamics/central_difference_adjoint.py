@@ -10,7 +10,7 @@ evaluation and the accelerations are stored for one segment of steps at a time.
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,12 +21,8 @@ from foldyn.dynamics.equation import EquationOfMotion, accelerate
 ROOM = 4e6  # memory for the states of a segment, bytes
 
 
-class Evaluated(NamedTuple):
-    """Point of a force evaluation in a step, and the acceleration there."""
-
-    u: NDArray  # (n, 3) m
-    ahead: NDArray  # (n, 3) velocity extrapolated to the step's end, m/s
-    a: NDArray  # (n, 3) m/s2
+Evaluated = tuple[NDArray, NDArray, NDArray]
+"""Displacement (n, 3), m, and velocity, m/s, of a force evaluation, and the acceleration, m/s2."""
 
 
 class CentralDifferenceAdjoint(Adjoint):
@@ -41,7 +37,7 @@ class CentralDifferenceAdjoint(Adjoint):
         self._number, self._segment = -1, list[Evaluated]()
         self._by_a = np.zeros_like(start.u)
         state = start.u, start.v, self._acceleration(0, start.u, start.v)
-        self._begin, self._kept = Evaluated(*state), [state]
+        self._begin, self._kept = state, [state]
         for first in range(0, self._plan.steps - self._apart, self._apart):
             self._kept.append(self._taken(first, first + self._apart, *self._kept[-1])[0])
 
@@ -52,10 +48,8 @@ class CentralDifferenceAdjoint(Adjoint):
             if number != self._number:
                 start = number * self._apart
                 end = min(start + self._apart, self._plan.steps)
-                self._number, self._segment = (
-                    number,
-                    self._taken(start, end, *self._kept[number])[1],
-                )
+                self._number = number
+                self._segment = self._taken(start, end, *self._kept[number])[1]
             self._back(step, self._segment[place], by_u, by_v)
         if first == 0:
             push = self._push(self._by_a)
@@ -73,7 +67,7 @@ class CentralDifferenceAdjoint(Adjoint):
 
     def _taken(
         self, first: int, last: int, u: NDArray, v: NDArray, a: NDArray
-    ) -> tuple[tuple[NDArray, NDArray, NDArray], list[Evaluated]]:
+    ) -> tuple[Evaluated, list[Evaluated]]:
         """Repeat the steps `first` to `last`; return the final state and all force evaluations.
 
         Reproduces the forward run bit for bit.
@@ -85,7 +79,7 @@ class CentralDifferenceAdjoint(Adjoint):
             ahead = v + 0.5 * dt * a
             a = self._acceleration(step, u, ahead)
             v = v + 0.5 * dt * a
-            taken.append(Evaluated(u, ahead, a))
+            taken.append((u, ahead, a))
         return (u, v, a), taken
 
     def _acceleration(self, step: int, u: NDArray, v: NDArray) -> NDArray:

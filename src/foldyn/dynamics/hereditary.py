@@ -24,16 +24,11 @@ def with_memory(case: Case, body: Assembly, by: Numbering) -> Assembly:
     if not parts:
         return body
     case.check_flow()
-    state = memory_of_case(case)
+    state = memory(parts, case.body)
     hinges = {"fold": body.sheet.fold_hinges, "bend": body.sheet.bend_hinges}
     row = np.concatenate([hinges[p.kind]().row[p.rows] for p in parts])
     own = state.own._replace(dofs=by.dofs(state.own.dofs), row=row)
     return body.with_terms(HingeMemory(own, state.settles, body.sheet))
-
-
-def memory_of_case(case: Case) -> HingeMemory:
-    """State at rest of a case's memory branches; dofs in the order of the structure."""
-    return memory(case.remembering, case.body)
 
 
 def instant_stiffness(case: Case, u: NDArray) -> sparse.csr_array | None:
@@ -43,7 +38,7 @@ def instant_stiffness(case: Case, u: NDArray) -> sparse.csr_array | None:
         return None
     body = case.body
     q = body.dofs(u)
-    gradient = memory_of_case(case).gradients(q, body.size)
+    gradient = memory(parts, body).gradients(q, body.size)
     added = [
         part.stiffness * sum(own.relaxed + own.share + own.more for own in part.branches)
         for part in parts

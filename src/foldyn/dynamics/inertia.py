@@ -77,18 +77,18 @@ def inertia(mass: sparse.csr_array, fixed: NDArray, ties: Ties, hidden: NDArray)
     mass.sort_indices()
     diagonal = mass.diagonal()
     lumped = is_lumped(mass) and not len(ties.slave)
+    inverse, factor_of_axis, factors = np.zeros((0, 3)), np.zeros(3, np.int64), []
     if len(ties.slave):
-        inverse, factor_of_axis = np.zeros((0, 3)), np.zeros(3, np.int64)
         tied = reduced(sparse.kron(mass, sparse.eye_array(3), format="csr"), ties)
-        diagonal = _least(tied.diagonal(), ties, diagonal)
+        least = np.full(len(diagonal), np.inf)
+        np.minimum.at(least, ties.free // 3, tied.diagonal())
+        diagonal = np.where(np.isfinite(least), least, diagonal)
         massless = sparse.diags_array((tied.diagonal() <= 0.0).astype(float))
         factors = [_factor(sparse.csr_array(tied + massless), ties.free)]
     elif lumped:
         inverse = np.where(fixed, 0.0, 1.0 / np.where(diagonal > 0.0, diagonal, 1.0)[:, None])
         inverse[len(inverse) - len(rows) :] = 1.0 / rows
-        factor_of_axis, factors = np.zeros(3, np.int64), []
     else:
-        inverse = np.zeros((0, 3))
         distinct, factor_of_axis = np.unique(fixed, axis=1, return_inverse=True)
         free = [np.flatnonzero(~held) for held in distinct.T]
         factors = [_factor(mass[nodes][:, nodes], nodes) for nodes in free]
@@ -112,13 +112,6 @@ def lightness(mass: Inertia) -> NDArray:
     share = 1.0 if mass.lumped else 0.5
     own = share * mass.diagonal
     return np.divide(1.0, own, out=np.zeros_like(own), where=own > 0.0)
-
-
-def _least(diagonal: NDArray, ties: Ties, own: NDArray) -> NDArray:
-    """Least mass (n,) that the free dofs of each node feel; `own` for nodes without free dofs."""
-    least = np.full(len(own), np.inf)
-    np.minimum.at(least, ties.free // 3, diagonal)
-    return np.where(np.isfinite(least), least, own)
 
 
 def _factor(mass: sparse.csr_array, nodes: NDArray) -> tuple:

@@ -238,14 +238,11 @@ def warn_of_standing_in_wind(case: Case, v: NDArray) -> None:
     v : (n, 3) velocities at the start, m/s.
     """
     air = case.air
-    if (
-        air is None
-        or air.added_mass is not True
-        or len(np.unique(case.structure.triangle_panel)) < 2
-    ):
+    if air is None or air.added_mass is not True:
         return
     wind = float(np.linalg.norm(air.velocity))
-    if wind > SLOW_WIND * float(np.linalg.norm(v, axis=1).max()):
+    panels = len(np.unique(case.structure.triangle_panel))
+    if panels > 1 and wind > SLOW_WIND * float(np.linalg.norm(v, axis=1).max()):
         warn(
             f"air: in a wind of {wind:g} m/s a moment on stationary panels is missing, of up to "
             "0.3 times 1/2 density U^2 A a/2 (U the wind, A and a a panel's area and width), since "

@@ -11,12 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from foldyn.cases import Case, Origin, State
 from foldyn.cases.history import CALLED
-from foldyn.dynamics import (
-    central_difference,
-    dormand_prince,
-    energy_momentum,
-    generalized_alpha,
-)
+from foldyn.dynamics import central_difference, dormand_prince, energy_momentum, generalized_alpha
 from foldyn.dynamics.checkpoint import beyond_samples, state_parts
 from foldyn.dynamics.engine import Engine
 from foldyn.dynamics.equation import EquationOfMotion, accelerate
@@ -259,8 +254,7 @@ def suited(name: str, case: Case) -> Integrator:
     if lack := lacking(method, case):
         fit = ", ".join(other.name for other in METHODS.values() if not lacking(other, case))
         raise InputError(
-            f" = {name!r}: {lack}; choose {f'one of {fit}' if fit else 'another model'}",
-            "method",
+            f" = {name!r}: {lack}; choose {f'one of {fit}' if fit else 'another model'}", "method"
         )
     return method
 

@@ -215,8 +215,8 @@ def _swinging(
         swings = (spectrum.values > 0.0) & ~_rigid(pencil, spectrum, case, state, free)
         found, all_known = int(swings.sum()), sought == pencil.finite
         values = spectrum.values[swings]
-        if wanted is None or (found >= wanted and (all_known or _apart(values, wanted))):
-            last = np.inf if wanted is None else values[wanted - 1] * (1.0 + ALIKE)
+        last = np.inf if wanted is None or found < wanted else values[wanted - 1] * (1.0 + ALIKE)
+        if wanted is None or (found >= wanted and (all_known or values[-1] > last)):
             kept = np.flatnonzero(swings)[values <= last]
             return Spectrum(spectrum.values[kept], spectrum.shapes[:, kept], math.nan, len(kept), 0)
         if all_known:
@@ -224,11 +224,6 @@ def _swinging(
                 f": ratios of {wanted} modes, but only {found} swing; give fewer", "damping.modal"
             )
         sought = min(2 * sought, pencil.finite)
-
-
-def _apart(values: NDArray, wanted: int) -> bool:
-    """Whether a mode above the last wanted frequency has been found."""
-    return bool(values[-1] > values[wanted - 1] * (1.0 + ALIKE))
 
 
 def _rigid(

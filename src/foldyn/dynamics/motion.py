@@ -272,12 +272,6 @@ class Motion:
         self._engine, self.seconds = engine, seconds
 
     @property
-    def _origin(self) -> str:
-        """What the motion started from, in words for the result."""
-        continues = isinstance(self._engine, ImplicitEngine) and self._engine.continues
-        return "end of a motion" if continues else "rest" if self.at_rest else "state"
-
-    @property
     def _branches(self) -> int:
         """Number of memory branches."""
         memory = self.packed.body.find(HingeMemory)
@@ -531,6 +525,7 @@ class Motion:
 
     def _statistics(self) -> dict[str, Any]:
         plan, tally, engine = self.plan, self.state.tally, self._engine
+        continues = isinstance(engine, ImplicitEngine) and engine.continues
         facts: dict[str, Any] = {
             "method": self.method.name,
             **steps_taken(plan, tally),
@@ -538,7 +533,7 @@ class Motion:
             "wall_seconds": self.seconds,
             "threads": engine.threads if engine else 1,
             "energy_error": self.output.update_balance(self.stored).relative,
-            "started_from": self._origin,
+            "started_from": "end of a motion" if continues else "rest" if self.at_rest else "state",
         }
         if self.reason:
             facts["method_reason"] = self.reason

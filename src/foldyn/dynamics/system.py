@@ -25,13 +25,7 @@ from foldyn.dynamics.actuation import Actuators, actuators
 from foldyn.dynamics.added_mass import AddedMass, added_mass
 from foldyn.dynamics.dampers import air_terms, damping_terms
 from foldyn.dynamics.hereditary import with_memory
-from foldyn.dynamics.inertia import (
-    Inertia,
-    inertia,
-    lightness,
-    substitute,
-    times_mass,
-)
+from foldyn.dynamics.inertia import Inertia, inertia, lightness, substitute, times_mass
 from foldyn.dynamics.modal_damping import ModalRows, modal_rows
 from foldyn.dynamics.ties import Ties, ties_of
 from foldyn.jit.compiled import inner

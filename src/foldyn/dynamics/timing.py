@@ -190,9 +190,8 @@ def check_room(samples: int, nodes: int, supported: int, room: float) -> None:
 
 def histories(case: Case) -> Iterator[tuple[str, History]]:
     """Varying histories of a case, each with the name of what it drives."""
-    rest = (
-        len(case.body.sheet.rest_angles) - case.body.sheet.offsets
-    )  # moments of creases are loads
+    # moments of creases are loads
+    rest = len(case.body.sheet.rest_angles) - case.body.sheet.offsets
     driven = {
         "a load": (*case.load_terms, *case.following_terms),
         "an imposed displacement": case.imposed_terms,

@@ -13,17 +13,7 @@ import xarray as xr
 
 from foldyn.cases import Case
 from foldyn.errors import InputError
-from foldyn.exports import (
-    abaqus,
-    csv_tables,
-    glb,
-    mat,
-    mjcf,
-    opensees,
-    pattern_states,
-    uff,
-    vtkhdf,
-)
+from foldyn.exports import abaqus, csv_tables, glb, mat, mjcf, opensees, pattern_states, uff, vtkhdf
 from foldyn.exports.chosen import ALONG
 from foldyn.input_files import path_of
 from foldyn.results import case_of, check_result, load

@@ -1,10 +1,7 @@
 # Public names and where they live; loaded when they are first used (facade.py)
 
 from foldyn.patterns.boards import Boards as Boards
-from foldyn.patterns.facets import (
-    convex as convex,
-    welded as welded,
-)
+from foldyn.patterns.facets import convex as convex, welded as welded
 from foldyn.patterns.flat_foldability import (
     FlatFoldability as FlatFoldability,
     flat_foldable as flat_foldable,

@@ -19,6 +19,7 @@ an even series has only cosines.
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from contextlib import AbstractContextManager
 from functools import cached_property
 from typing import NamedTuple
@@ -30,6 +31,7 @@ from foldyn.periodic.equation import Equation, Instants
 from foldyn.threads import one_thread
 
 OVER = 8  # samples per harmonic and period
+ITERATIONS = 25  # most iterations of Newton's method
 
 
 class Fourier:
@@ -62,9 +64,8 @@ class Fourier:
     @cached_property
     def order(self) -> NDArray:
         """Harmonic (c,) of each coefficient."""
-        if self.even:
-            return np.arange(self.harmonics + 1)
-        return np.concatenate([[0], np.repeat(np.arange(1, self.harmonics + 1), 2)])
+        number = np.arange(self.count)
+        return number if self.even else (number + 1) // 2
 
     @cached_property
     def phase(self) -> NDArray:
@@ -75,10 +76,9 @@ class Fourier:
     def at(self, phase: NDArray) -> NDArray:
         """Value (s, c) of each function of the series at phases (s,)."""
         angle = np.multiply.outer(phase, self.order)
-        if self.even:
-            return np.cos(angle)
         out = np.cos(angle)
-        out[:, 2::2] = np.sin(angle[:, 2::2])
+        if not self.even:
+            out[:, 2::2] = np.sin(angle[:, 2::2])
         return out
 
     @cached_property
@@ -209,56 +209,46 @@ class Converged(NamedTuple):
     iterations: int
 
 
-def newton(system, x: NDArray, tolerance: float, most: int = 25) -> Converged | None:
-    """Solve `system.residual(x) = 0`; None if it does not converge.
+def newton(
+    residual: Callable[[NDArray], NDArray], jacobian: Callable[[NDArray], NDArray], x: NDArray,
+    tolerance: float, rounding: float,
+) -> Converged | None:  # fmt: skip
+    """Solve residual(x) = 0 for a vector x (n,); None if it does not converge.
 
     Steps are halved if they pass through a contact, where forces are not finite.
 
     Parameters
     ----------
-    system
-        An object with `residual(x)` and `jacobian(x)` for vectors x (n,), and `rounding`, the
-        rounding errors of the residual's norm.
+    residual, jacobian : callable
+        Functions of x (n,) that return the residual (n,) and its derivative (n, n).
+    x : ndarray, shape (n,)
+        Start of the iteration.
     tolerance : float
         Largest norm of the last step, as a fraction of the norm of the solution.
+    rounding : float
+        Rounding errors of the residual's norm.
     """
     x, step, first = x.copy(), np.zeros_like(x), np.inf
-    for iteration in range(most):
-        residual = system.residual(x)
-        norm = float(np.linalg.norm(residual))
+    for iteration in range(ITERATIONS):
+        left = residual(x)
+        norm = float(np.linalg.norm(left))
         if not np.isfinite(norm):
             step *= 0.5
             x -= step
             continue
         first = min(first, norm)
-        if norm > 1e8 * max(first, system.rounding):
+        if norm > 1e8 * max(first, rounding):
             return None
         if norm == 0.0:
             return Converged(x, iteration)
         try:
-            step = np.linalg.solve(system.jacobian(x), -residual)
+            step = np.linalg.solve(jacobian(x), -left)
         except np.linalg.LinAlgError:
             return None
         if not np.isfinite(step).all():
             return None
         x += step
         size, change = float(np.linalg.norm(x)), float(np.linalg.norm(step))
-        if change <= tolerance * size or (iteration and norm <= system.rounding):
+        if change <= tolerance * size or (iteration and norm <= rounding):
             return Converged(x, iteration + 1)
     return None
-
-
-class AtFrequency:
-    """A balance at one frequency and level, in the form that `newton` takes."""
-
-    def __init__(self, balance: Balance, omega: float, level: float = 1.0) -> None:
-        self.balance, self.omega, self.level = balance, omega, level
-        self.at, self.rounding = balance.instants(level), balance.rounding()
-
-    def residual(self, x: NDArray) -> NDArray:
-        """R (c k,)."""
-        return self.balance.residual(x.reshape(self.balance.shape), self.omega, self.at).ravel()
-
-    def jacobian(self, x: NDArray) -> NDArray:
-        """Derivative (c k, c k) of R."""
-        return self.balance.jacobian(x.reshape(self.balance.shape), self.omega, self.at)

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -141,8 +142,7 @@ def located(
     return min((one for one in found.values() if one), key=lambda one: abs(value(one)))
 
 
-@dataclass(frozen=True)
-class Stride:
+class Stride(NamedTuple):
     """Step length control."""
 
     first: float
@@ -150,14 +150,12 @@ class Stride:
     most: int  # largest number of points
 
 
-@dataclass(frozen=True, eq=False)
-class Step:
-    """A step along a family: its ends, its length, and whether it reaches the end of the range."""
+class Step(NamedTuple):
+    """A step along a family: its ends and its length."""
 
     before: Point
     after: Point
     length: float
-    last: bool
 
 
 LOST, LONG = "lost", "long"
@@ -188,9 +186,9 @@ def steps(
         if outside(other) > 0.0:
             if outside(point) < 0.0:
                 end = located(family, point, other, length, outside)
-                yield Step(point, end, _along(family, point, end), True)
+                yield Step(point, end, _along(family, point, end))
             return
-        step = Step(point, other, length, False)
+        step = Step(point, other, length)
         if taken > 1 and _passes(family, step, first):
             return  # the curve is closed
         yield step

@@ -27,6 +27,7 @@ from scipy.linalg import eigh
 from foldyn.attractors.drive import check_harmonic, lowest_frequency
 from foldyn.cases import Case, Constant, Harmonic, Origin
 from foldyn.cases.air import refuse_air
+from foldyn.cases.contact_checks import check_contact
 from foldyn.cases.releases import refuse_releases
 from foldyn.cases.springs import refuse_driven
 from foldyn.dynamics.dampers import damping_terms
@@ -65,10 +66,12 @@ class Tangents:
     ) -> None:
         self._basis, self._vectors, size = basis, vectors, basis.shape[1]
         sheet, places = body.sheet, {}  # by number of the term; -1 is the sheet
-        blocks = isinstance(sheet, BarsHingesTerm)
-        places[-1] = (
-            _of_blocks(sheet) if blocks else sheet.tangent(np.zeros(sheet.size)).tocoo().coords
-        )
+        if isinstance(sheet, BarsHingesTerm):
+            ends, indices, *_ = sheet.sparsity
+            pattern = sparse.bsr_array((np.ones((len(indices), 3, 3)), indices, ends))
+        else:
+            pattern = sheet.tangent(np.zeros(sheet.size))
+        places[-1] = pattern.tocoo().coords
         for k, term in enumerate(body.others):
             if type(term).tangent is Term.tangent:
                 places[k] = term.places
@@ -115,15 +118,6 @@ class Tangents:
         if rest is not None:
             along += self._basis.T @ (rest @ (self._basis @ self._vectors))
         out[:] = self._vectors.T @ along
-
-
-def _of_blocks(sheet: BarsHingesTerm) -> tuple[NDArray, NDArray]:
-    """Row and column of each entry of the blocks of a sheet's tangent."""
-    pattern, axis = sheet.sparsity, np.arange(3)
-    node = np.repeat(np.arange(len(pattern.indptr) - 1), np.diff(pattern.indptr))
-    row = np.broadcast_to((3 * node[:, None] + axis)[:, :, None], (len(node), 3, 3))
-    column = np.broadcast_to((3 * pattern.indices[:, None] + axis)[:, None], row.shape)
-    return row.ravel(), column.ravel()
 
 
 def _spread(
@@ -224,11 +218,6 @@ class Drive:
         self.frequency = lowest_frequency(found)
         self.highest = round(max(found) / self.frequency) if found else 0
 
-    @property
-    def varies(self) -> bool:
-        """Whether anything drives the case."""
-        return self.frequency > 0.0
-
     def factors(self, terms: Terms, phase: NDArray, level: float) -> NDArray:
         """Factors of k terms and first two derivatives of the factors (3, s, k), at phases (s,)."""
         out = np.zeros((3, len(phase), len(terms)))
@@ -324,6 +313,12 @@ class Equation:
         """The equation at phases (s,) of the drive, with all varying terms times a level."""
         return Instants(self, phase, level * self.level)
 
+    def undriven(self, displacement: NDArray) -> tuple[Instants, NDArray]:
+        """The equation without drive, and unknowns (k,) of a displacement (n, 3) that it allows."""
+        still = self.at(np.zeros(1), 0.0)
+        check_contact(self.case, displacement, still.planes[0])
+        return still, self.unknowns(displacement[None], still)[0]
+
     def projected(self, matrix: sparse.csr_array) -> NDArray:
         """B' K B (k, k) of a matrix of all dofs."""
         found = self.basis.T @ (matrix @ self.basis)
@@ -365,8 +360,11 @@ class Equation:
         return dofs[:, : nodes.size].reshape(-1, *nodes.shape)
 
     def unknowns(self, displacement: NDArray, instants: Instants) -> NDArray:
-        """Unknowns (s, k) of displacements (s, n, 3) of all nodes at some instants."""
-        return self.coordinates(instants.balanced(displacement), instants)
+        """Unknowns (s, k) of displacements (s, n, 3) of all nodes; other dofs are in balance."""
+        following, none = self._following, np.zeros(self.body.size)
+        each = zip(displacement, instants.bodies, instants._factor, strict=True)
+        dofs = [body.dofs(u, following_force(following, none, factor)) for u, body, factor in each]
+        return self.coordinates(np.array(dofs), instants)
 
     def coordinates(self, dofs: NDArray, instants: Instants) -> NDArray:
         """Unknowns (s, k) of displacements (s, m) of all dofs at some instants."""
@@ -392,11 +390,12 @@ class Instants:
 
     def __init__(self, equation: Equation, phase: NDArray, level: float) -> None:
         drive, body, basis = equation.drive, equation.body, equation.basis
-        self.equation, self.phase, self.level = equation, phase, level
+        self.equation = equation
         self.moved, first, second = drive.sums(drive.moves, phase, level, body.size)
         mass, drag = equation._moved
         self.inertia, self.drag = second @ mass.T, first @ drag.T
-        self.loads = drive.sums(drive.loads, phase, level, body.size)[0] @ basis
+        self._pushed = drive.sums(drive.loads, phase, level, body.size)[0]
+        self.loads = self._pushed @ basis
         rest = body.sheet.rest_angles
         turned = drive.sums(drive.turns, phase, level, len(rest))[0]
         self.bodies = [body.folded(rest + turn) if drive.turns else body for turn in turned]
@@ -412,16 +411,6 @@ class Instants:
     def displacements(self, x: NDArray) -> NDArray:
         """Displacements of all dofs (s, m), m, from unknowns (s, k)."""
         return x @ self.equation.basis.T + self.moved + self.equation.offset
-
-    def balanced(self, displacement: NDArray) -> NDArray:
-        """Displacements (s, m) of all dofs, of those of nodes (s, n, 3); others are in balance."""
-        following, none = self.equation._following, np.zeros(self.moved.shape[1])
-        return np.array(
-            [
-                body.dofs(u, following_force(following, none, factor))
-                for u, body, factor in zip(displacement, self.bodies, self._factor, strict=True)
-            ]
-        )
 
     def _each(self, x: NDArray):
         """Yield the number, the displacement and the body of each instant."""
@@ -454,7 +443,4 @@ class Instants:
     def energies(self, x: NDArray) -> NDArray:
         """Strain energy less the work of constant loads (s,), J, at unknowns (s, k)."""
         strain = np.array([body.energies(u).sum() for _, u, body in self._each(x)])
-        loads = self.equation.drive.sums(
-            self.equation.drive.loads, self.phase, self.level, self.moved.shape[1]
-        )[0]
-        return strain - np.einsum("jm,jm->j", loads, self.displacements(x))
+        return strain - np.einsum("jm,jm->j", self._pushed, self.displacements(x))

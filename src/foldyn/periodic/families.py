@@ -15,12 +15,13 @@ position only the hinges are integrated: bar forces are accurate there for small
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.mechanics.assembly import Assembly
-from foldyn.periodic.balance import Balance
+from foldyn.periodic.balance import Balance, Converged, newton
 from foldyn.periodic.equation import EPS, Equation, Instants
 from foldyn.periodic.orbit import Orbit
 
@@ -149,16 +150,20 @@ class Family:
         return self.balance.jacobian(*self.at(z, p))
 
     def slope(self, z: NDArray, p: float) -> NDArray:
-        """Derivative (n,) of R with respect to p: differences, exact for loads linear in p."""
-        return self.by_level(z, p)
+        """Derivative (n,) of R with respect to p: differences, exact for loads linear in p.
 
-    def by_level(self, z: NDArray, p: float) -> NDArray:
-        """Derivative (c k,) of the balance with respect to p through the level, by differences."""
+        It is the derivative of the balance through the level.
+        """
         up, down = (
             self.balance.residual(x, omega, self.balance.instants(level))
             for x, omega, level in (self.own(z, p + PROBE), self.own(z, p - PROBE))
         )
         return (up - down).ravel() / (2.0 * PROBE)
+
+    def solved(self, z: NDArray, p: float) -> Converged | None:
+        """Unknowns of the motion at a parameter p near unknowns z; see `newton`."""
+        residual, jacobian = partial(self.residual, p=p), partial(self.jacobian, p=p)
+        return newton(residual, jacobian, z, self.tolerance, self.rounding)
 
     def orbit(self, z: NDArray, p: float) -> Orbit:
         """The periodic motion at unknowns z and parameter p."""
@@ -279,4 +284,4 @@ class InResonance(Family):
 
     def slope(self, z: NDArray, p: float) -> NDArray:
         """Derivative (n,) of R with respect to p."""
-        return np.append(self.by_level(z, p), 0.0)
+        return np.append(super().slope(z, p), 0.0)

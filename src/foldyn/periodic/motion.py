@@ -13,11 +13,10 @@ from numpy.typing import NDArray
 
 from foldyn.attractors.drive import HARMONIC
 from foldyn.cases import Case, Constant, Impose, Origin, State
-from foldyn.cases.contact_checks import check_contact
 from foldyn.dynamics import initial
 from foldyn.errors import ComputationError, InputError, warn
 from foldyn.linear.linearized import equivalent_slope
-from foldyn.periodic.balance import AtFrequency, Balance, Converged, Fourier, newton, values_of
+from foldyn.periodic.balance import Balance, Converged, Fourier, newton, values_of
 from foldyn.periodic.continuation import Step, Stride, point_at, steps
 from foldyn.periodic.equation import Equation
 from foldyn.periodic.families import ByLevel
@@ -185,7 +184,7 @@ def balance_of(
     """
     harmonics = whole("harmonics", harmonics, least=1)
     equation = Equation(case, name, driven, origin_of(case, guess) if driven else None)
-    if driven and not equation.drive.varies:
+    if driven and not equation.drive.frequency:
         raise InputError(
             f"case: nothing drives it: {name} follows the period of a load or support; give one "
             f"the history {HARMONIC}"
@@ -245,7 +244,8 @@ def _shot(
     near = Orbit.of(few, balanced(few, coefficients(few, guess, omega), omega, 1e-3).x, omega)
     shooting = Shooting(equation, omega, steps, longer)
     x, v = (values_of(near.amplitudes, np.zeros(1), k)[0] for k in (0, 1))
-    found = newton(shooting, np.concatenate([x, v[: equation.heavy]]), tolerance)
+    start = np.concatenate([x, v[: equation.heavy]])
+    found = newton(shooting.residual, shooting.jacobian, start, tolerance, 0.0)
     if found is None:
         raise ComputationError(
             f"method = 'shooting': does not converge at {omega / TURN:g} Hz; give more steps, or "
@@ -290,6 +290,13 @@ def equilibrium(case: Case) -> NDArray:
     return trace(still, "newton", load_factors=[0.0, 1.0])["displacement"].values[-1]
 
 
+def place_of(case: Case, state: Any, field: str, expected: str) -> NDArray:
+    """Displacement (n, 3), m, of a state, or of the equilibrium if none is given."""
+    if state is None:
+        return equilibrium(case)
+    return displacement_of(state, case, field, expected)
+
+
 def origin_of(case: Case, guess: Any) -> Origin | None:
     """State about which damping with ``state = "initial"`` is taken; None without such damping.
 
@@ -308,14 +315,9 @@ def coefficients(balance: Balance, guess: Any, omega: float, level: float = 1.0)
     equation = balance.equation
     if isinstance(guess, xarray.Dataset):
         return _of_result(balance, guess, level)
-    if guess is None:
-        place = equilibrium(equation.case)
-    else:
-        place = displacement_of(guess, equation.case, "guess", PLACES)
-    mean = equation.at(np.zeros(1), 0.0)
-    check_contact(equation.case, place, mean.planes[0])
+    place = place_of(equation.case, guess, "guess", PLACES)
     x = np.zeros(balance.shape)
-    x[0] = equation.unknowns(place[None], mean)[0]
+    x[0] = equation.undriven(place)[1]
     return x + linear_response(balance, x, omega, level)
 
 
@@ -372,17 +374,16 @@ def balanced(
     ComputationError
         Neither motion is found.
     """
-    found = newton(AtFrequency(balance, omega, level), x.ravel(), tolerance)
-    return _grown(balance, x, omega, tolerance, level) if found is None else found
-
-
-def _grown(balance: Balance, x: NDArray, omega: float, tolerance: float, level: float) -> Converged:
-    """Follow the motion from a small drive to the full one, around folds."""
     family = ByLevel(balance, level, tolerance, omega / TURN)
-    still = np.zeros(balance.shape)
+    return family.solved(x.ravel(), level) or _grown(family, x, level)
+
+
+def _grown(family: ByLevel, x: NDArray, level: float) -> Converged:
+    """Follow the motion from a small drive to the full one, around folds."""
+    still = np.zeros(x.shape)
     still[0] = x[0]
     begin = (still + SMALL * (x - still)).ravel()
-    first, share = newton(AtFrequency(balance, omega, SMALL * level), begin, tolerance), 0.0
+    first, share = family.solved(begin, SMALL * level), 0.0
     if first is not None:
         spent, ahead = first.iterations, np.append(np.zeros(x.size), 1.0)
         top = point_at(family, first.x, SMALL * level, ahead)  # point with the largest drive so far
@@ -391,11 +392,11 @@ def _grown(balance: Balance, x: NDArray, omega: float, tolerance: float, level: 
                 break
             spent += step.after.iterations
             top = max(top, step.after, key=lambda point: point.p)
-        found, share = newton(AtFrequency(balance, omega, level), top.z, tolerance), top.p / level
+        found, share = family.solved(top.z, level), top.p / level
         if found is not None:
             return Converged(found.x, spent + found.iterations)
     raise ComputationError(
-        f"frequency = {omega / TURN:g} Hz: no periodic motion is found; the search ends at "
+        f"frequency = {family.omega / TURN:g} Hz: no periodic motion is found; the search ends at "
         f"{share:.2g} of the drive. Remedies: another guess (a motion at a frequency nearby, or a "
         "State), fd.response_curve from a frequency off resonance, or more damping"
     )

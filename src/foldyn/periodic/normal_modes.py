@@ -12,7 +12,6 @@ import xarray
 from numpy.typing import NDArray
 
 from foldyn.cases import Case, State
-from foldyn.cases.contact_checks import check_contact
 from foldyn.dynamics import Progress
 from foldyn.dynamics.progress import Reporter, reported
 from foldyn.errors import ComputationError, InputError, MotionInterrupted, warn
@@ -24,14 +23,13 @@ from foldyn.periodic.motion import (
     FLOOR,
     balance_of,
     balanced,
-    equilibrium,
     linear_response,
+    place_of,
     warn_of_errors,
 )
 from foldyn.periodic.orbit import SHOWN, STEPS, Orbit, along, is_stable
 from foldyn.ram_limit import check_memory
 from foldyn.results.dataset import points_dataset
-from foldyn.statics.tracing import displacement_of
 from foldyn.values import flag, number, numbers, of_kind, show, whole
 
 FIRST = 0.3  # length of the first step, relative to the longest step
@@ -176,7 +174,12 @@ def backbone(
             orbits = [_sharpened(family, orbit) for orbit in orbits]
             values = _values(orbits, place)
         else:
-            values = _damped_values(orbits)
+            floquet = np.array([orbit.multipliers(STEPS) for orbit in orbits])
+            values = {
+                "level": np.array([orbit.level for orbit in orbits]),
+                "floquet": floquet,
+                "stable": np.array([is_stable(row) for row in floquet]),
+            }
         values |= along(orbits)
         values["frequency"] = np.array([orbit.omega / TURN for orbit in orbits])
         values["amplitude"] = np.array([_largest(orbit, place) for orbit in orbits])
@@ -192,20 +195,14 @@ def backbone(
 def _mode(equation: Equation, state: Any, mode: int) -> tuple[NDArray, float, NDArray]:
     """Equilibrium (k,), and frequency (Hz) and shape (k,) of a mode; some node moves by 1."""
     case = equation.case
-    if state is None:
-        displacement = equilibrium(case)
-    else:
-        displacement = displacement_of(state, case, "state", "a State, as fd.initial_state(path)")
-    at = equation.at(np.zeros(1), 0.0)
-    check_contact(case, displacement, at.planes[0])
-    place = equation.unknowns(displacement[None], at)[0]
+    displacement = place_of(case, state, "state", "a State, as fd.initial_state(path)")
+    at, place = equation.undriven(displacement)
     stiffness = _settled(equation, at, place)
     if mode > equation.heavy:
         raise InputError(f" = {mode}: there are {equation.heavy} modes", "mode")
-    soft = equation.body.sheet.soft_hinges(at.displacements(place[None])[0])
-    if len(soft.offset):  # laws with zero slope at rest
-        floored = equation.body.tangent(at.displacements(place[None])[0], FLOOR)
-        stiffness = equation.projected(floored)
+    u = at.displacements(place[None])[0]
+    if len(equation.body.sheet.soft_hinges(u).offset):  # laws with zero slope at rest
+        stiffness = equation.projected(equation.body.tangent(u, FLOOR))
     value, vector = equation.vibrations(stiffness, mode - 1, mode - 1)
     if not value[0] > 0.0:
         raise ComputationError(
@@ -349,16 +346,6 @@ def _values(orbits: list[Orbit], place: NDArray) -> dict[str, Any]:
             "nonlinear-vibration.md#backbones",
         )
     return {"energy": energies[:, 0], "energy_drift": energies[:, 1]}
-
-
-def _damped_values(orbits: list[Orbit]) -> dict[str, Any]:
-    """Levels, multipliers and stability of motions in phase resonance."""
-    floquet = np.array([orbit.multipliers(STEPS) for orbit in orbits])
-    return {
-        "level": np.array([orbit.level for orbit in orbits]),
-        "floquet": floquet,
-        "stable": np.array([is_stable(row) for row in floquet]),
-    }
 
 
 def _energy(orbit: Orbit, place: NDArray) -> tuple[float, float]:

@@ -43,34 +43,22 @@ NEUTRAL = 1e-6  # excess of a modulus over 1 that counts as round-off
 
 
 class Tableau:
-    """Coefficients of a collocation method, for velocities and for displacements."""
+    """Coefficients of a collocation method, for velocities and for displacements.
 
-    def __init__(self, c: NDArray, b: NDArray, a: NDArray) -> None:
-        self.c, self.b, self.a, self.aa, self.ba = c, b, a, a @ a, b @ a
+    Those for velocities are the integrals of the polynomials that are 1 at one of the stages, at
+    fractions c (3,) of a step, and 0 at the others: up to each stage (a), and up to the end (b).
+    """
+
+    def __init__(self, c: NDArray) -> None:
+        power = np.arange(1, STAGES + 1)
+        polynomials = np.linalg.inv(c[:, None] ** (power - 1))  # coefficients, by columns
+        self.c, self.b = c, 1.0 / power @ polynomials
+        self.a = c[:, None] ** power / power @ polynomials
+        self.aa, self.ba = self.a @ self.a, self.b @ self.a
 
 
-GAUSS = Tableau(
-    np.array([0.5 - ROOT15 / 10.0, 0.5, 0.5 + ROOT15 / 10.0]),
-    np.array([5.0, 8.0, 5.0]) / 18.0,
-    np.array(
-        [
-            [5 / 36, 2 / 9 - ROOT15 / 15, 5 / 36 - ROOT15 / 30],
-            [5 / 36 + ROOT15 / 24, 2 / 9, 5 / 36 - ROOT15 / 24],
-            [5 / 36 + ROOT15 / 30, 2 / 9 + ROOT15 / 15, 5 / 36],
-        ]
-    ),
-)
-RADAU = Tableau(
-    np.array([(4 - ROOT6) / 10, (4 + ROOT6) / 10, 1.0]),
-    np.array([(16 - ROOT6) / 36, (16 + ROOT6) / 36, 1 / 9]),
-    np.array(
-        [
-            [(88 - 7 * ROOT6) / 360, (296 - 169 * ROOT6) / 1800, (-2 + 3 * ROOT6) / 225],
-            [(296 + 169 * ROOT6) / 1800, (88 + 7 * ROOT6) / 360, (-2 - 3 * ROOT6) / 225],
-            [(16 - ROOT6) / 36, (16 + ROOT6) / 36, 1 / 9],
-        ]
-    ),
-)
+GAUSS = Tableau(0.5 + ROOT15 / 10.0 * np.array([-1.0, 0.0, 1.0]))
+RADAU = Tableau(np.array([(4.0 - ROOT6) / 10.0, (4.0 + ROOT6) / 10.0, 1.0]))
 ITERATIONS = 30
 SETTLED = 1e-10  # largest last Newton step within a time step, relative to the acceleration
 STUCK = 0.5  # a Newton step above this fraction of the previous one means round-off is reached
@@ -174,14 +162,10 @@ class Shooting:
         Periods of the drive in one period of the motion.
     """
 
-    rounding = 0.0
-
-    def __init__(
-        self, equation: Equation, omega: float, steps: int, multiple: int = 1, level: float = 1.0
-    ) -> None:
+    def __init__(self, equation: Equation, omega: float, steps: int, multiple: int = 1) -> None:
         self.equation, self.omega, self.w = equation, omega, omega / multiple
         self.steps = steps * multiple
-        self._at = [equation.at(multiple * row, level) for row in stage_phases(self.steps, RADAU)]
+        self._at = [equation.at(multiple * row) for row in stage_phases(self.steps, RADAU)]
         self._stages = Stages(
             self.w**2 * equation.mass, self.w * equation.damping, 2.0 * np.pi / self.steps, RADAU,
             equation.heavy,

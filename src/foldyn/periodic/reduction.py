@@ -18,7 +18,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import cho_factor, cho_solve
 
-from foldyn.cases.contact_checks import check_contact
 from foldyn.errors import ComputationError, InputError
 from foldyn.periodic.equation import Equation, Instants, Tangents
 
@@ -42,9 +41,7 @@ def reduced(equation: Equation, modes: int, displacement: NDArray) -> Equation:
     Equation
         The reduced equation; its attribute `whole` is the given equation.
     """
-    still = equation.at(np.zeros(1), 0.0)
-    check_contact(equation.case, displacement, still.planes[0])
-    place = equation.unknowns(displacement[None], still)[0]
+    still, place = equation.undriven(displacement)
     if modes >= equation.heavy:
         raise InputError(
             f" = {modes}: must be below the number of unknowns, {equation.heavy}", "modes"

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -53,15 +52,14 @@ SURE = {FOLD: 1e-6, PITCHFORK: 1e-3, DOUBLING: 1e-3, TORUS: 1e-3}
 REAL = 1e-9  # largest imaginary part of a real multiplier
 
 
-@dataclass(eq=False)
-class _Found:
+class _Found(NamedTuple):
     """A recorded point of the curve."""
 
     family: Any
     point: Point
     branch: int
-    bifurcation: str = ""
-    floquet: NDArray = field(default_factory=lambda: np.zeros(0))
+    bifurcation: str
+    floquet: NDArray
 
 
 def response_curve(
@@ -211,10 +209,7 @@ class _Tracer:
     def first(self, family: Any, guess: Any) -> Point:
         """Point at the first end of the range, with the tangent toward the second."""
         balance, p = family.balance, self.ends[0]
-        if self.by == "frequencies":
-            omega, level = 2.0 * np.pi * p, 1.0
-        else:
-            omega, level = family.omega, p
+        _, omega, level = family.own(np.zeros(balance.shape).ravel(), p)
         x = coefficients(balance, guess, omega, level)
         z = balanced(balance, x, omega, self.tolerance, level).x
         ahead = np.append(np.zeros(len(z)), np.sign(self.ends[1] - self.ends[0]))

@@ -5,20 +5,14 @@ from foldyn.signals.circles import (
     circle_fit as circle_fit,
     circle_fits as circle_fits,
 )
-from foldyn.signals.decrement import (
-    LogDecrement as LogDecrement,
-    log_decrement as log_decrement,
-)
+from foldyn.signals.decrement import LogDecrement as LogDecrement, log_decrement as log_decrement
 from foldyn.signals.peaks import (
     HalfPower as HalfPower,
     Peaks as Peaks,
     find_peaks as find_peaks,
     half_power as half_power,
 )
-from foldyn.signals.pencil import (
-    DecayingModes as DecayingModes,
-    matrix_pencil as matrix_pencil,
-)
+from foldyn.signals.pencil import DecayingModes as DecayingModes, matrix_pencil as matrix_pencil
 from foldyn.signals.preprocessing import (
     choose_window as choose_window,
     fill_gaps as fill_gaps,
@@ -26,10 +20,7 @@ from foldyn.signals.preprocessing import (
     remove_trend as remove_trend,
     subtract_final as subtract_final,
 )
-from foldyn.signals.records import (
-    is_uniform as is_uniform,
-    sampling_interval as sampling_interval,
-)
+from foldyn.signals.records import is_uniform as is_uniform, sampling_interval as sampling_interval
 from foldyn.signals.responses import (
     FrequencyResponse as FrequencyResponse,
     base_transmissibility as base_transmissibility,
@@ -39,10 +30,7 @@ from foldyn.signals.responses import (
     transmissibility as transmissibility,
     without_window as without_window,
 )
-from foldyn.signals.shocks import (
-    ShockSpectrum as ShockSpectrum,
-    shock_spectrum as shock_spectrum,
-)
+from foldyn.signals.shocks import ShockSpectrum as ShockSpectrum, shock_spectrum as shock_spectrum
 from foldyn.signals.sines import (
     SineFit as SineFit,
     fit_sine as fit_sine,

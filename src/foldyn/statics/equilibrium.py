@@ -440,9 +440,12 @@ def _total(terms: Iterable[tuple[NDArray, Any]], shape: tuple[int, ...]) -> NDAr
 
 def drives(case: Case, constant: Sequence[int]) -> bool:
     """Whether anything in a case grows with the load factor."""
-    growing = any(i not in set(constant) for i in range(len(case.loads)))
-    driven = bool(case.elastic_body.histories)
-    return growing or driven or bool(case.imposed_terms) or bool(case.obstacle_terms)
+    return any(i not in set(constant) for i in range(len(case.loads))) or is_moved(case)
+
+
+def is_moved(case: Case) -> bool:
+    """Whether supports, planes, or lengths of springs or cables change with the load factor."""
+    return bool(case.imposed_terms or case.obstacle_terms or case.elastic_body.histories)
 
 
 def is_actuated(case: Case) -> bool:

@@ -31,6 +31,7 @@ Neither condition can be met below round-off. A residual below the rounding erro
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -225,10 +226,16 @@ def settings_of(given: Any) -> Settings:
 
 
 def plane(normal: NDArray, reach: float) -> Rule:
-    """Rule of a step that ends in the plane in which normal times the motion equals `reach`."""
-    return lambda moved, step, response: (
-        (reach - float(normal @ (moved + step))) / float(normal @ response)
-    )
+    """Rule of a step that ends in the plane in which normal times the motion equals `reach`.
+
+    It gives nan where the plane contains the response.
+    """
+
+    def change(moved: NDArray, step: NDArray, response: NDArray) -> float:
+        across = float(normal @ response)
+        return (reach - float(normal @ (moved + step))) / across if across != 0.0 else math.nan
+
+    return change
 
 
 class Attempt(NamedTuple):

@@ -54,7 +54,14 @@ class Memories:
         flows = _flows(case, flow, timed)
         body = case.body
         self._creases = self._friction = None
-        if _rubs(case, flow):
+        rubs = case.contact is not None and case.contact.rubs
+        if rubs and flow == REFUSED:
+            raise InputError(
+                ".friction: makes equilibria depend on the path, and only fd.simulate and fd.trace "
+                "follow it; elsewhere give 0, here and in the planes",
+                "contact",
+            )
+        if rubs and flow == FOLLOWED:
             contact, self._friction = case.contact_term.rubbing()
             body = case.elastic_body.with_terms(contact)
         if flows and flow == FOLLOWED:
@@ -128,26 +135,6 @@ class Memories:
         """Energy (J) dissipated by creases and friction up to an accepted step."""
         own = [] if kept is None else [memory for memory in kept[:2] if memory is not None]
         return float(sum(memory[2][0] for memory in own))
-
-
-def _rubs(case: Case, flow: str) -> bool:
-    """Whether a path has friction.
-
-    Raises
-    ------
-    InputError
-        The case has friction that the solver cannot handle.
-    """
-    contact = case.contact
-    if contact is None or not contact.rubs:
-        return False
-    if flow == REFUSED:
-        raise InputError(
-            ".friction: makes equilibria depend on the path, and only fd.simulate and fd.trace "
-            "follow it; elsewhere give 0, here and in the planes",
-            "contact",
-        )
-    return flow == FOLLOWED
 
 
 def flowing(case: Case, timed: bool) -> NDArray:

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.errors import InputError
-from foldyn.statics.newton import COLLIDES, EPS, UNKNOWN, Attempt, Rule, Solver
+from foldyn.statics.newton import COLLIDES, EPS, UNKNOWN, Attempt, Rule, Solver, plane
 from foldyn.statics.stability import LostError, Section, critical_points
 from foldyn.statics.stepping import (
     PathStoppedError,
@@ -48,7 +48,7 @@ REMEDY = (
 )
 
 
-class Plane:
+def normal_plane(length: float, prediction: NDArray) -> Rule:
     """Rule of modified generalized displacement control, the method of MERLIN2, for one step.
 
     After the prediction c1 = df1 b1, with b1 the response to the load factor at the start of the
@@ -56,38 +56,26 @@ class Plane:
     long as the first step of the path, |df1| = length/|b1|, which with the first response b0 is
     the square root of the generalized stiffness parameter |b0.b0/(b1.b1)| (Leon, Lages, de Araujo
     and Paulino, Comput. Mech. 53, 2014: "modified" because the parameter and the plane use only
-    the response of the present step, not also the response of the previous step).
+    the response of the present step, not also the response of the previous step). If only part of
+    a step was taken, the motion is brought back into the plane.
     """
-
-    def __init__(self, length: float, prediction: NDArray) -> None:
-        self.prediction = prediction  # the plane passes through its end point
-
-    def __call__(self, moved: NDArray, step: NDArray, response: NDArray) -> float:
-        """Change of the load factor; nan where the plane contains the response."""
-        across = float(self.prediction @ response)
-        # if only part of a step was taken, the motion is brought back into the plane
-        short = float(self.prediction @ (moved + step)) - float(self.prediction @ self.prediction)
-        return -short / across if across != 0.0 else math.nan
+    return plane(prediction, float(prediction @ prediction))
 
 
-class Cylinder:
+def cylinder(length: float, prediction: NDArray) -> Rule:
     """Rule of the cylindrical arc length for one step: it fixes the distance from start to end.
 
     With c the motion since the start of the step, a the step of Newton's method at the present
     load factor and b the response to the factor, |c + a + df b| = length is a quadratic equation
     for df (Crisfield, Computers and Structures 13, 1981). The rule takes the root that
-    continues in the direction of the step.
+    continues in the direction of the step, or nan where the arc does not meet the linearized path.
     """
 
-    def __init__(self, length: float, prediction: NDArray) -> None:
-        self.length, self.prediction = length, prediction
-
-    def __call__(self, moved: NDArray, step: NDArray, response: NDArray) -> float:
-        """Change of the load factor; nan where the arc does not meet the linearized path."""
+    def change(moved: NDArray, step: NDArray, response: NDArray) -> float:
         reached = moved + step
         a = float(response @ response)
         b = float(response @ reached)
-        c = float(reached @ reached) - self.length**2
+        c = float(reached @ reached) - length**2
         root = b * b - a * c
         if not root >= 0.0 or a == 0.0:
             return math.nan
@@ -95,8 +83,10 @@ class Cylinder:
         # without cancellation: one root from a sum of two terms of equal sign, the other by Vieta
         far = -(b + math.copysign(root, b))
         roots = (far / a, c / far if far != 0.0 else 0.0)
-        along = [float((reached + root * response) @ self.prediction) for root in roots]
+        along = [float((reached + root * response) @ prediction) for root in roots]
         return roots[int(np.argmax(along))]
+
+    return change
 
 
 def follow(
@@ -109,7 +99,7 @@ def follow(
     solver, start
         Solver, and the station where the path begins.
     rule : ArcRule
-        Rule of the method, such as `Cylinder`.
+        Rule of the method, such as `cylinder`.
     first_step : float
         Change of the load factor in the first step; it sets the length of the following steps.
     direction : (m,) or None
@@ -236,8 +226,8 @@ class PathMethod(NamedTuple):
 METHODS: Mapping[str, PathMethod] = {
     "newton": PathMethod("newton", None, False),
     "displacement": PathMethod("displacement", None, True),
-    "mgdcm": PathMethod("mgdcm", Plane, True),
-    "arc_length": PathMethod("arc_length", Cylinder, True),
+    "mgdcm": PathMethod("mgdcm", normal_plane, True),
+    "arc_length": PathMethod("arc_length", cylinder, True),
 }
 
 

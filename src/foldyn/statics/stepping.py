@@ -202,6 +202,7 @@ class Released(Problem):
         self.problem, self.factor = problem, factor
         self.free, self.held = problem.free, problem.held
         self.force_rounding, self.length = problem.force_rounding, problem.length
+        self.turn, self.clear = problem.turn, problem.clear
         self._from = u[problem.held]
         self._to = problem.prescribed(factor)
         self._out = problem.residual(u, factor)
@@ -230,14 +231,6 @@ class Released(Problem):
     def keep(self, u: NDArray, factor: float) -> Any:
         """Accept a state in the problem."""
         return self.problem.keep(u, self.factor)
-
-    def turn(self, u: NDArray, v: NDArray) -> float:
-        """Largest turn from u to v in the problem."""
-        return self.problem.turn(u, v)
-
-    def clear(self, u: NDArray, step: NDArray) -> float:
-        """Share of a step before anything crosses in the problem."""
-        return self.problem.clear(u, step)
 
 
 def settle(solver: Solver, u: NDArray, factor: float) -> Station:

@@ -35,7 +35,7 @@ from foldyn.cases.releases import refuse_releases
 from foldyn.errors import InputError
 from foldyn.mechanics.term import Unstrained
 from foldyn.ram_limit import check_memory
-from foldyn.statics.equilibrium import AdaptiveLoad, OrigamiProblem, drives, is_actuated
+from foldyn.statics.equilibrium import AdaptiveLoad, OrigamiProblem, drives, is_actuated, is_moved
 from foldyn.statics.newton import Settings, Solver, settings_of
 from foldyn.statics.path_memory import FOLLOWED, flowing
 from foldyn.statics.path_methods import METHODS, PathPlan, along, plan_path
@@ -301,8 +301,7 @@ def displacement_of(
 def _check_case(case: Case, plan: PathPlan, constant: Sequence[int], adaptive: bool) -> None:
     """Refuse a case in which nothing changes along the path."""
     case.check_movable()
-    moves = bool(case.imposed_terms) or is_actuated(case) or bool(case.obstacle_terms)
-    moves = moves or bool(case.elastic_body.histories)
+    moves = is_actuated(case) or is_moved(case)
     if plan.method.name == "displacement" and not moves:
         raise InputError(
             " 'displacement' needs something that moves: an Impose among the supports, an Actuate "
@@ -334,7 +333,7 @@ def _check_start(problem: OrigamiProblem, factor: float) -> None:
 
 def _check_driven(problem: OrigamiProblem, begin: float, plan: PathPlan) -> None:
     """Refuse load factors at which supports and planes have passed through each other."""
-    if problem.case.contact is None or not drives(problem.case, range(len(problem.case.loads))):
+    if problem.case.contact is None or not is_moved(problem.case):
         return
     ends = [begin, *plan.factors, *([] if plan.end is None else [plan.end])]
     between = [np.linspace(a, b, LOOKS) for a, b in itertools.pairwise(ends)]

@@ -72,10 +72,7 @@ if SIMULATED:
 else:
     from numba import types
     from numba.cuda import cgutils, extending  # type: ignore[attr-defined]
-    from numba.cuda.np.arrayobj import (  # type: ignore[import-not-found]
-        make_array,
-        populate_array,
-    )
+    from numba.cuda.np.arrayobj import make_array, populate_array  # type: ignore[import-not-found]
 
     intrinsic: Any = extending.intrinsic
 

@@ -26,13 +26,7 @@ from numpy.typing import NDArray
 from foldyn.algebra.superlu import SingularTangentError
 from foldyn.dynamics.implicit.matrix import StepMatrix
 from foldyn.dynamics.implicit.newton import Newton
-from foldyn.dynamics.implicit.scheme import (
-    NOT_CONVERGED,
-    NOT_FINITE,
-    SOLVED,
-    Scheme,
-    judge,
-)
+from foldyn.dynamics.implicit.scheme import NOT_CONVERGED, NOT_FINITE, SOLVED, Scheme, judge
 from foldyn.dynamics.system import place
 from foldyn.mechanics.contact.candidates import NORMAL, POINT
 from foldyn.mechanics.contact.ccd import KEEP

@@ -9,13 +9,7 @@ from numpy.typing import NDArray
 
 from foldyn.jit.compiled import inner, inner_scalar, kernel
 from foldyn.jit.context import Context, numbers_at, rows_at
-from foldyn.mechanics.contact.boards import (
-    Ride,
-    add_back,
-    put_lightness,
-    put_points,
-    put_rates,
-)
+from foldyn.mechanics.contact.boards import Ride, add_back, put_lightness, put_points, put_rates
 from foldyn.mechanics.contact.candidates import HISTORY, Tables
 from foldyn.mechanics.contact.contact_state import ENERGY, Memory, energy_of_all, finish, reaches
 from foldyn.mechanics.contact.distances import VERTEX, nodes_of

@@ -305,10 +305,8 @@ def _best_way(
         stiffest, *others = bending.folding
         best = ways.from_pattern(energy, stiffest, targets, steps, tell)
         for softer in others:
-            if (
-                any(cost(best)[:3])
-                or energy.bent(best.shapes[-1].turns).max(initial=0.0) > ways.SLIGHT
-            ):
+            bend = energy.bent(best.shapes[-1].turns).max(initial=0.0)
+            if any(cost(best)[:3]) or bend > ways.SLIGHT:
                 best = min(best, ways.from_pattern(energy, softer, targets, steps, tell), key=cost)
         if initial == "pattern" or not any(cost(best)[:3]):
             return best
@@ -411,14 +409,12 @@ def path_of(pattern: Pattern, energy: FoldEnergy, way: ways.Way) -> xarray.Datas
     for shape in way.shapes:
         place = placed(energy.place(shape.x), place)
         positions.append(place)
-    strain = [ways.largest_strain(shape) for shape in way.shapes]
-    bend = [energy.bent(shape.turns).max(initial=0.0) for shape in way.shapes]
     values = {
         "displacement": np.array(positions) - pattern.vertices,
         "position": positions,
         "fold_angle": [energy.creases(shape.turns) for shape in way.shapes],
-        "strain": strain,
-        "bend": bend,
+        "strain": [ways.largest_strain(shape) for shape in way.shapes],
+        "bend": [energy.bent(shape.turns).max(initial=0.0) for shape in way.shapes],
     }
     return folding_dataset(pattern, way.shares, values, {"started_from": way.origin})
 

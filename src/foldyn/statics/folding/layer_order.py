@@ -66,14 +66,13 @@ class LayerConstraints(NamedTuple):
         Panels that overlap, the lower number first.
     products : list of (tuple of int, int)
         Rows of `pairs`, and the product of their orders.
-    triples, turns : (t, 3)
-        Three rows of `pairs` each, and the signs with which their orders must not all be equal.
+    triples : (t, 3)
+        Rows of the pairs (a, b), (b, c) and (a, c) of three panels that share an area.
     """
 
     pairs: NDArray[np.int64]
     products: list[tuple[tuple[int, ...], int]]
     triples: NDArray[np.int64]
-    turns: NDArray[np.int64]
 
 
 def layer_constraints(pattern: Pattern, state: FlatState) -> LayerConstraints:
@@ -125,8 +124,7 @@ def layer_constraints(pattern: Pattern, state: FlatState) -> LayerConstraints:
             if side[e, 0] != way * side[f, 0]:
                 c, d = d, c
             multiplied([(a, c), (b, d)], 1)
-    triples = _triples(pairs, common, inside, row)
-    return LayerConstraints(pairs, products, triples, np.tile([1, 1, -1], (len(triples), 1)))
+    return LayerConstraints(pairs, products, _triples(pairs, common, inside, row))
 
 
 def _overlaps(inside: NDArray, near: float) -> tuple[NDArray[np.int64], NDArray]:
@@ -137,9 +135,7 @@ def _overlaps(inside: NDArray, near: float) -> tuple[NDArray[np.int64], NDArray]
     one, other = one[order], other[order]
     # on a grid: else the overlay finds nothing for panels that differ by round-off alone
     grid = GRID * near
-    common = np.asarray(shapely.intersection(inside[one], inside[other], grid_size=grid)).reshape(
-        -1
-    )
+    common = np.ravel(shapely.intersection(inside[one], inside[other], grid_size=grid))
     kept = shapely.area(common) > near**2
     return np.stack([one, other], axis=1)[kept].astype(np.int64), common[kept]
 
@@ -207,12 +203,9 @@ def flat_state(pattern: Pattern, angles: NDArray, closed: float) -> FlatState | 
     if ((size > math.pi - closed) & (size < closed)).any() or not (size >= closed).any():
         return None
     points, near = _flattened(pattern)
-    areas = []
-    for face in pattern.faces:
-        a, b = points[list(face)].T
-        areas.append(float(a @ np.roll(b, -1) - b @ np.roll(a, -1)))
+    up = [shapely.LinearRing(points[list(face)]).is_ccw for face in pattern.faces]
     signs = np.where(size >= closed, np.sign(angles), 0.0).astype(np.int64)
-    return FlatState(points, np.array(areas) > 0.0, signs, near)
+    return FlatState(points, np.array(up), signs, near)
 
 
 def _flattened(pattern: Pattern) -> tuple[NDArray, float]:
@@ -334,11 +327,7 @@ class _Search:
         # a condition: rows, and the product (an int) or the signs (a tuple) that must not be equal
         self.conditions: list[tuple[tuple[int, ...], int | tuple[int, ...]]] = [
             *constraints.products,
-            *zip(
-                map(tuple, constraints.triples.tolist()),
-                map(tuple, constraints.turns.tolist()),
-                strict=True,
-            ),
+            *((tuple(rows), (1, 1, -1)) for rows in constraints.triples.tolist()),
         ]
         self.of_row: list[list[int]] = [[] for _ in self.orders]
         for k, (rows, _) in enumerate(self.conditions):
