@@ -100,13 +100,23 @@ class Job(Task):
         """Name of the computation."""
         return f"{self.case}-{self.model}-{self.kind}"
 
+    @property
+    def implicit(self) -> bool:
+        """Whether motions use Newmark's method with the study's time step."""
+        return self.model == REFERENCE
+
+    @property
+    def secant(self) -> float | None:
+        """Amplitude (degrees) of the hinges in modes; None for their slope at rest."""
+        return None if self.model == REFERENCE else SECANT
+
     def settings(self) -> dict[str, Any]:
         """Everything on which the result depends."""
         numerics = {} if self.kind != "motion" else {"duration": self.numerics.duration}
-        if self.model == REFERENCE:  # other models have no mesh, and the case file's time step
+        if self.model == REFERENCE:  # other models have no mesh
             numerics["divisions"] = self.numerics.divisions
-            if self.kind == "motion":
-                numerics["dt"] = self.numerics.dt
+        if self.kind == "motion" and self.implicit:
+            numerics["dt"] = self.numerics.dt
         return {
             "case": self.case,
             "case_file": case_file_digest(self.case),
@@ -129,12 +139,10 @@ class Job(Task):
         if self.kind == "path":
             found = trace(case, steps=STEPS)
         elif self.kind == "modes":
-            shell = self.model == REFERENCE
-            count, secant = (SHELL_MODES, None) if shell else (RULE_MODES, SECANT)
-            found = modes(replace(case, loads=()), count, secant=secant, check_model=False)
+            count = SHELL_MODES if self.model == REFERENCE else RULE_MODES
+            found = modes(replace(case, loads=()), count, secant=self.secant, check_model=False)
         else:
-            newmark = {"method": "newmark", "dt": self.numerics.dt}
-            own = newmark if self.model == REFERENCE else {}
+            own = {"method": "newmark", "dt": self.numerics.dt} if self.implicit else {}
             given = {"interval": INTERVAL, **case_file.analysis.arguments, **own}
             found = simulate(case, **{**given, "duration": self.numerics.duration})
         kept = found.drop_vars("velocity", errors="ignore")
