@@ -95,6 +95,7 @@ DATA: Calls = {
     }),
     "Bar": (fd.Bar, {
         "between": [(0, 1)], "stiffness": 2.0, "rest_length": 0.5, "bending": 0.25,
+        "mass": 0.5, "until": 0.5,
     }),
     "Cable": (fd.Cable, {
         "nodes": [0, 1, (0.5, 0.25, 1.0)], "stiffness": 2.0, "pretension": 0.5, "change": 0.25,

@@ -202,7 +202,7 @@ def test_unit_scale_and_frame_in_a_case_file(tmp_path):
         np.testing.assert_allclose(found.vertices, scale * folded.vertices)
     for keys, text in (
         ('unit = "ell"\n', r'pattern\.file = "x\.fold": .*unit = "ell": choose'),
-        ("frame = 7\n", "frame = 7: the file has the frames 0 to 1"),
+        ("frame = 7\n", "frame = 7: must be at most 1"),
         ('unt = "mm"\n', r"pattern\.unt"),
     ):
         with pytest.raises(InputError, match=text):

@@ -341,7 +341,7 @@ def halves(part: Any) -> list[Any]:
         value = getattr(part, item.name)
         if item.name in HALVED or f"{kind}.{item.name}" in HALVED:
             half = replace(part, **{item.name: (0.5 * np.array(value)).tolist()})
-            for other in ("pretension", "release", "damping"):
+            for other in ("pretension", "release", "damping", "mass"):
                 if getattr(part, other, None) is not None:
                     half = replace(half, **{other: 0.5 * getattr(part, other)})
             if getattr(part, "history", None) is None or isinstance(part, fd.Spring | fd.Cable):

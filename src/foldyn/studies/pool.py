@@ -25,12 +25,13 @@ SETTINGS = "study_settings"
 
 
 class Task(ABC):
-    """A computation whose result is kept by `store` in a file, `name` with ".nc".
+    """A computation whose result is kept by `store` in a file named `name` plus `suffix`.
 
     A task is hashable and can be sent to another process.
     """
 
     store: ClassVar[Store[Any]]
+    suffix: ClassVar[str] = ".nc"
 
     @property
     @abstractmethod
@@ -47,7 +48,7 @@ class Task(ABC):
 
     def file(self, folder: Path) -> Path:
         """File of the result in a folder."""
-        return folder / f"{self.name}.nc"
+        return folder / f"{self.name}{self.suffix}"
 
     def result(self, folder: Path) -> Any:
         """The result in a folder; None if it is missing or was computed with other settings."""
