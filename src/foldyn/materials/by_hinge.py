@@ -31,6 +31,10 @@ class LawByHinge(HingeLaw):
         """Names of all laws."""
         return ", ".join(law.name for law in self.laws)
 
+    def __str__(self) -> str:
+        """Names of all laws, for messages."""
+        return self.name
+
     @property
     def parts(self) -> tuple[tuple[HingeLaw, Any], ...]:
         """See `HingeLaw`."""
