@@ -267,7 +267,7 @@ class Structure(Discretized):
             mass = lumped(self.node_mass)
         else:
             mass = MASS_RULES[self.options.mass](self.surface)
-        mass.sort_indices()  # read-only, it can no longer be
+        mass.sum_duplicates()  # sorts, which read-only arrays no longer can
         for array in (mass.data, mass.indices, mass.indptr):
             read_only(array)
         return mass
