@@ -40,19 +40,18 @@ def carried_mass(
     masses: Sequence[PointMass], supports: Sequence[Any], structure: Discretized
 ) -> sparse.csr_array:
     """Mass matrix (n, n), kg, of point masses, and of bars, which stay straight."""
-    total = np.zeros(len(structure.nodes))
+    ends, entries, size = [np.zeros((2, 0), np.int64)], [np.zeros(0)], len(structure.nodes)
     for i, part in enumerate(masses):
-        total[resolve_nodes(structure, part.nodes, f"masses[{i}].nodes")] += part.mass
-    pairs, each = [], []
+        nodes = resolve_nodes(structure, part.nodes, f"masses[{i}].nodes")
+        ends.append(np.stack([nodes, nodes]))
+        entries.append(np.full(len(nodes), part.mass))
     for i, part in enumerate(supports):
         for k, pair in enumerate(part.between if isinstance(part, Bar) and part.mass else ()):
-            pairs.append(resolve_nodes(structure, pair, f"supports[{i}].between[{k}]"))
-            each.append(part.mass / 6.0)
-    ends = np.reshape(pairs, (-1, 2)).astype(int)
-    rows, columns = np.repeat(ends, 2, axis=1).ravel(), np.tile(ends, 2).ravel()
-    blocks = np.multiply.outer(each, [2.0, 1.0, 1.0, 2.0]).ravel()
-    strung = sparse.csr_array((blocks, (rows, columns)), 2 * total.shape)
-    return sparse.csr_array(sparse.diags_array(total) + strung)
+            a, b = resolve_nodes(structure, pair, f"supports[{i}].between[{k}]").tolist()
+            ends.append(np.array([[a, a, b, b], [a, b, a, b]]))
+            entries.append(part.mass / 6.0 * np.array([2.0, 1.0, 1.0, 2.0]))
+    places = np.concatenate(ends, axis=1)
+    return sparse.csr_array((np.concatenate(entries), places), (size, size))
 
 
 MASS = PartOf((PointMass,), "masses")
