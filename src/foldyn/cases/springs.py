@@ -386,10 +386,12 @@ class Cable(Elastic):
 def rubbing(parts: Sequence[tuple[str, Cable]], structure: Discretized) -> CapstanTerm | None:
     """Friction of cables, each with its place; None without any."""
     rubs = [(place, part) for place, part in parts if part.friction]
+    if not rubs:
+        return None
     with quietly():  # the springs of the case have warned
         springs = Elastic.term(rubs, structure)
     rub = np.array([(part.friction, part.sliding_speed) for _, part in rubs])
-    return CapstanTerm(springs, rub) if rubs else None
+    return CapstanTerm(springs, rub)
 
 
 def _following(case: Any, *keys: str) -> Iterator[str]:
