@@ -8,7 +8,7 @@ from casefile_checks import check
 
 import foldyn as fd
 from case_texts import HELD_MIURA_TEXT, changed, rows
-from foldyn.analyses.path import Reached
+from foldyn.cases.reached import ReachedDisplacement
 from foldyn.cases import Fix, Force, Gravity, Impose
 from foldyn.errors import InputError
 from foldyn.statics import Settings
@@ -61,7 +61,7 @@ def test_everything_that_can_be_said(read) -> None:
     found = read(PATH.replace("= 0.01\n", "= 0.01\ndensity = 1.0\n") + EVERYTHING)
     given = {"method": "arc_length", "load_factors": [0.0, 0.5], "steps": 30, "first_step": 0.01}
     given |= {"duration": None, "constant": (1,), "inertia_relief": False}
-    given["until"] = Reached(node=7, axis="x", displacement=0.02)
+    given["until"] = ReachedDisplacement(node=7, axis="x", displacement=0.02)
     given["settings"] = Settings(tolerance=1e-10, largest_turn=3.0, stability=False)
     assert found.analysis.arguments == given
     assert found.output.shapes == (0, 5, -1)
@@ -86,7 +86,7 @@ def test_moved_supports_are_shown_where_nothing_is_loaded(read) -> None:
 def test_where_a_path_ends() -> None:
     u = np.zeros((3, 3))
     for goal in (0.2, -0.2):
-        reached = Reached(node=1, axis="z", displacement=goal)
+        reached = ReachedDisplacement(node=1, axis="z", displacement=goal)
         for moved, answer in ((0.0, False), (0.19, False), (0.2, True), (0.3, True), (-0.3, False)):
             u[1, 2] = moved * np.sign(goal)
             assert reached(u, 1.0) is answer

@@ -85,8 +85,10 @@ def check_vertices(schema: Any, count: int) -> None:
         for key in ("nodes", "between")
         if not isinstance(given := getattr(part, key, "") or "", str)
     }
-    until = getattr(schema.analysis, "until", None)
-    places |= {} if until is None else {"analysis.until.node": (until.node,)}
+    parts = {f"supports[{i}]": part for i, part in enumerate(schema.supports)}
+    for place, part in {**parts, "analysis": schema.analysis}.items():
+        node = getattr(getattr(part, "until", None), "node", None)
+        places |= {} if node is None else {f"{place}.until.node": (node,)}
     places["output.nodes"] = getattr(schema.output, "nodes", None)
     for place, nodes in places.items():
         if nodes is None or isinstance(nodes, str):

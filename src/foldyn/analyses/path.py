@@ -31,18 +31,18 @@ from foldyn.analyses.sections import (
 from foldyn.analyses.start import StoredStart
 from foldyn.analyses.stress_page import FILES, stress_sections
 from foldyn.arguments import Check
-from foldyn.cases import Case, Contact, resolve_nodes
+from foldyn.cases import Case, Contact
 from foldyn.cases.directions import DIRECTIONS
 from foldyn.cases.loads import LOAD
+from foldyn.cases.reached import REACHED, Reached
 from foldyn.cases.supports import SUPPORT
-from foldyn.errors import ComputationError, InputError
+from foldyn.errors import ComputationError, InputError, within
 from foldyn.plots.charts import Chart, Curve
 from foldyn.plots.readings import along, critical_word, evenly, is_loose, main_direction
 from foldyn.report.album import Album, ByRule, crossing_panels, listed, shown_nodes, visible_scale
 from foldyn.report.sections import Charts, Heading, Picture, Section, Table, Text, cell
 from foldyn.statics import METHODS, Landscape, Point, Settings, landscape, trace
 from foldyn.statics.newton import settings_of
-from foldyn.statics.tracing import UNTIL, Reached
 from foldyn.strength.resultants import check_stresses
 from foldyn.tables import ListOf, TableOf
 from foldyn.values import indices, number, number_or_list, show
@@ -98,7 +98,7 @@ class PathSection(AnalysisSection):
     ] = None
     first_step: Annotated[float | None, Check(number)] = None
     constant: Annotated[str | Sequence[int], Check(constant_loads)] = ()
-    until: Annotated[Reached | None, UNTIL] = None
+    until: Annotated[Reached | None, REACHED] = None
     inertia_relief: Switch = False
     tolerance: Annotated[float, Check(number, least=1e-14, most=1e-2)] = Settings.tolerance
     largest_turn: Positive = Settings.largest_turn
@@ -162,7 +162,8 @@ class PathAnalysis(Analysis):
         if schema.output.stresses:
             check_stresses(case, "output.stresses")
         if until is not None:
-            resolve_nodes(case.structure, (until.node,), "analysis.until.node")
+            with within("analysis.until."):
+                until.share(case)
         settings = Settings(**{name: given.pop(name) for name in SETTINGS})
         return cls({**given, "settings": settings})
 

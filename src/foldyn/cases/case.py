@@ -22,7 +22,7 @@ from foldyn.cases.history import CONSTANT, History, as_history, factor
 from foldyn.cases.latches import Latch
 from foldyn.cases.loads import LOADS, Gravity, Load
 from foldyn.cases.masses import PointMass, carried_mass
-from foldyn.cases.releases import release_times, released
+from foldyn.cases.releases import check_releases
 from foldyn.cases.springs import Bar, Cable, Elastic, Made
 from foldyn.cases.state import State
 from foldyn.cases.supports import SUPPORTS, Fix, Impose, Link, Support
@@ -151,8 +151,7 @@ class Case(Loaded, Damped):
         _ = self.base_terms, self.actuation_terms  # check the supports and the creases
         if self.constraints:
             _ = self.imposed_terms
-        if times := release_times(self):
-            _ = released(self, times[-1])  # loads need to move only what is free in the end
+        if check_releases(self):
             return
         for place, load in self._loads():
             if not (self.structure.linear and self._acts_between(load, place)):

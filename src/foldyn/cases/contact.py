@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.arguments import Check, Flag, Read
-from foldyn.cases.decode import Factor, Part, PartOf, Until
+from foldyn.cases.decode import Factor, Part, PartOf
 from foldyn.cases.history import as_history
+from foldyn.cases.reached import Until
 from foldyn.errors import InputError
 from foldyn.mechanics.contact.boards import BoardSheets
 from foldyn.mechanics.contact.candidates import (

@@ -22,7 +22,7 @@ from foldyn.json_schema import Schema, any_of, of_call
 from foldyn.mechanics.term import Term
 from foldyn.structures.discretized import Discretized
 from foldyn.tables import check_keys, check_table, needs, read, schema_of
-from foldyn.values import choice, number, plain, show
+from foldyn.values import choice, plain, show
 
 signature = cache(inspect.signature)
 
@@ -163,10 +163,6 @@ Factor = Annotated[
 ]
 
 
-Until = Annotated[float | None, Check(number, above=0.0, unit="s")]
-"""Time at which a part of a case is released; see `releases`."""
-
-
 class Part(Checked):
     """A load, a support, a point mass or a kind of damping: a frozen data class.
 
@@ -199,7 +195,11 @@ class Part(Checked):
         """The part's table of plain values, without histories and arguments that are None."""
         given = {key: getattr(self, name) for key, name in self.by_key().items()}
         some = {key: value for key, value in given.items() if not key.endswith("history")}
-        return {key: plain(value) for key, value in some.items() if value is not None}
+        return {
+            key: value.table() if isinstance(value, Part) else plain(value)
+            for key, value in some.items()
+            if value is not None
+        }
 
 
 class PartOf(Check):

@@ -12,9 +12,10 @@ from numpy.typing import NDArray
 
 from foldyn.arguments import Check, Key
 from foldyn.cases.connectors import NEAR, Connector
-from foldyn.cases.decode import Factor, Part, Until
+from foldyn.cases.decode import Factor, Part
 from foldyn.cases.directions import Direction, Pairs
 from foldyn.cases.history import CONSTANT, STEADY, History
+from foldyn.cases.reached import Until
 from foldyn.cases.selection import Nodes, refuse_linear, resolve_nodes
 from foldyn.errors import FoldynWarning, InputError, quietly, warn
 from foldyn.mechanics.capstan import CapstanTerm

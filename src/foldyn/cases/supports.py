@@ -10,10 +10,11 @@ import numpy as np
 
 from foldyn.arguments import Check, Flag, Key
 from foldyn.cases.connectors import Dashpot
-from foldyn.cases.decode import Factor, Part, PartOf, Until
+from foldyn.cases.decode import Factor, Part, PartOf
 from foldyn.cases.directions import AXES, Axes, Axis, Direction
 from foldyn.cases.history import STEADY
 from foldyn.cases.latches import Latch
+from foldyn.cases.reached import Until
 from foldyn.cases.selection import Nodes
 from foldyn.cases.springs import Bar, Cable, Spring
 from foldyn.cases.stops import Stop

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from foldyn.algebra.solvers import check_fill
 from foldyn.cases import Case, Dashpot, Rayleigh, State
-from foldyn.cases.releases import release_times
+from foldyn.cases.releases import release_times, waiting
 from foldyn.dynamics import generalized_alpha, timing
 from foldyn.dynamics.checkpoint import SECONDS, check_keeping
 from foldyn.dynamics.gpu.checks import check_gpu, check_taken
@@ -188,7 +188,7 @@ def prepared(
         )
     duration = number("duration", duration, above=0.0)
     start = float(number("start", given.get("start", 0.0), unit="s"))
-    if any(time < start + duration for time in release_times(case)):
+    if waiting(case) or any(time < start + duration for time in release_times(case)):
         given |= {"method": method, "start": start}
         return prepare_released(case, duration, prepare, **given)
     return prepare(case, duration, method, **given)
@@ -275,7 +275,7 @@ def prepare(
     packed = pack(case, timing.apart(plan, critical), origin, modal, hidden)
     if device == "gpu":
         check_taken(case, packed)
-    sampler = Sampler(case, {} if sample is None else sample, u, v, plan.start)
+    sampler = Sampler(case, sample, u, v, plan.start)
     start_from = u, v, remembered, initial.continuation if initial else None
     better = None
     if chosen.better:

@@ -3,31 +3,38 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import xarray
+from numpy.typing import NDArray
+from scipy.optimize import brentq
 
 from foldyn.cases import Case, State
-from foldyn.cases.releases import release_times, released, stays
+from foldyn.cases.reached import ReachedTension
+from foldyn.cases.releases import release_times, released, released_at, stays, timed, waiting
 from foldyn.dynamics import timing
 from foldyn.dynamics.audit import AIR, AUDITED, audited, energy_error, energy_scale
 from foldyn.dynamics.in_memory import InMemory
 from foldyn.dynamics.initial import initial_state
 from foldyn.dynamics.motion import Motion
 from foldyn.dynamics.progress import Progress, Reporter
-from foldyn.dynamics.sampling import forces_inside
-from foldyn.errors import ComputationError, MotionInterrupted, told_once
+from foldyn.dynamics.sampling import check_given
+from foldyn.errors import ComputationError, MotionInterrupted, quietly, told_once
 from foldyn.results.attributes import OWN
 from foldyn.results.crossings import crossings_of
-from foldyn.results.dataset import AXIS, result_dataset, stage_times
-from foldyn.results.quantities import ORIGIN, energies_of, variable
+from foldyn.results.dataset import result_dataset, stage_times
+from foldyn.results.parts import placed
+from foldyn.results.quantities import ORIGIN
 from foldyn.values import number
 
 SAME = 1e-9  # share of a step or an interval by which times may differ
+EXACT = 1e-8  # share of an interval to which the instant is found at which something is reached
+ALIKE = 1e-6  # share of an interval within which two such instants are one
+WATCH = "awaited"  # quantity that ends a part: nan where something is reached
 _, DISSIPATED, WORK = AUDITED
 SINCE = (DISSIPATED, WORK, AIR)  # energies that count from the start of a motion
 SUMMED = ("wall_seconds", "flow_energy")  # attributes that add up, besides whole numbers
@@ -41,6 +48,7 @@ class ReleasedMotion(InMemory):
 
     It consists of parts: motions from release to release. So that samples stay evenly spaced in
     time, a release between samples lies between two short parts, from and to the nearest samples.
+    A part in which something is reached that releases is computed again, up to that instant.
 
     Parameters
     ----------
@@ -48,43 +56,84 @@ class ReleasedMotion(InMemory):
         The case with its releases.
     prepare : callable
         Prepares a part; see `driver.prepare`.
-    times : tuple of float
-        The start, and the end of each part (s).
-    between : frozenset of float
-        Releases between samples (s).
+    start, end : float
+        Times (s).
     interval, every : float, int
         Time between samples (s), or 0 and the number of steps between samples.
     longest : float, optional
         Largest step (s).
     initial : State, optional
+    sample : mapping
+        The user's own quantities.
     """
 
     case: Case
     prepare: Callable[..., Motion]
-    times: tuple[float, ...]
-    between: frozenset[float]
+    start: float
+    end: float
     interval: float
     every: int
     longest: float | None
     initial: State | None
+    sample: Mapping[str, Any]
 
     kind = "a motion with releases"
+
+    def _between(self, case: Case) -> dict[float, float]:
+        """Releases of a case between samples (s), with their numbers of intervals."""
+        inside = [time for time in release_times(case) if self.start < time < self.end]
+        steps = {time: (time - self.start) / (self.interval or math.inf) for time in inside}
+        return {time: own for time, own in steps.items() if abs(own - round(own)) > SAME}
+
+    def _stop(self, case: Case, now: float) -> float:
+        """End (s) of the part of a case's motion that begins now."""
+        beside = [
+            self.start + near(steps) * self.interval
+            for steps in self._between(case).values()
+            for near in (math.floor, math.ceil)
+        ]
+        return min(t for t in (*release_times(case), *beside, self.end) if now < t <= self.end)
 
     @cached_property
     def first(self) -> Motion:
         """The first part."""
-        return self._part(0, self.initial)
+        case = self._begun(self.case, self.start, self.initial)
+        return self._part(case, self.start, self._stop(case, self.start), self.initial)
 
-    def _part(self, k: int, state: State | None) -> Motion:
-        """Part number k, from a state."""
-        now, length = self.times[k], self.times[k + 1] - self.times[k]
-        dt = self.longest
+    def _begun(self, case: Case, now: float, state: State | None) -> Case:
+        """The case without what a state releases at once."""
+        u = (state or State()).of_nodes("displacement", case.structure.nodes.shape)
+        while reached := [place for place, share in self._awaited(case, now) if share(u, now) >= 1]:
+            case = timed(case, dict.fromkeys(reached, now))
+        return case
+
+    def _awaited(self, case: Case, now: float) -> list[tuple[str, Callable[..., float]]]:
+        """What a case waits for now: the place, and a function of displacements and time (s)."""
+        gone = [not stays(support, now) for support, *_ in case.polylines()]
+        return [
+            (place, partial(_share_at, until.share(case)))
+            for place, until in waiting(case).items()
+            if not (isinstance(until, ReachedTension) and gone[until.line])
+        ]
+
+    def _part(
+        self, case: Case, now: float, stop: float, state: State | None, watched: bool = True
+    ) -> Motion:
+        """Part of a case's motion, from a state; if watched, it ends where something is reached."""
+        length, dt = stop - now, self.longest
         if dt is not None and abs(length - round(length / dt) * dt) > SAME * length:
             dt = length / math.ceil(length / dt)
-        interval = min(self.interval, length) or None
+        sample, awaited = self.sample, self._awaited(case, now) if watched else ()
+        if awaited:
+
+            def watch(u: NDArray, v: NDArray, time: float) -> float:
+                return math.nan if any(share(u, time) >= 1.0 for _, share in awaited) else 0.0
+
+            sample = {**sample, WATCH: watch}
         return self.prepare(
-            released(self.case, now), length, initial=state, start=now, dt=dt, interval=interval
-        )
+            released(case, now), length, initial=state, start=now, dt=dt,
+            interval=min(self.interval, length) or None, sample=sample,
+        )  # fmt: skip
 
     @property
     def method(self) -> Any:
@@ -95,47 +144,95 @@ class ReleasedMotion(InMemory):
     def expected_samples(self) -> int:
         """Number of samples, about, if samples are counted in steps."""
         spacing = self.interval or self.every * self.first.plan.dt
-        return 1 + round((self.times[-1] - self.times[0]) / spacing)
+        return 1 + round((self.end - self.start) / spacing)
 
     def _computed(self, report: Reporter) -> xarray.Dataset:
-        parts: list[xarray.Dataset] = []
+        parts: list[tuple[float, xarray.Dataset]] = []
+        now, state, motion = self.start, self.initial, self.first
+        case = self._begun(self.case, now, state)
         with told_once():
-            for k, now in enumerate(self.times[:-1]):
-                motion = self._next(k, parts[-1]) if parts else self.first
-                try:
-                    parts.append(motion.run(partial(self._tell, report, now)))
-                except (ComputationError, MotionInterrupted) as error:
-                    if error.partial is not None and error.partial.sizes["time"]:
-                        error.partial = self._joined([*parts, error.partial])
-                    raise
-        return self._joined(parts)
+            while True:
+                result, error = _run(motion, partial(self._tell, report, now))
+                if error and (times := self._instants(case, now, result)):
+                    case = timed(case, times)
+                elif error:
+                    if result is not None and result.sizes["time"]:
+                        error.partial = self._joined(case, [*parts, (now, result)])
+                    raise error
+                else:
+                    parts.append((now, result))
+                    now, state = self._stop(case, now), initial_state(result)
+                    if now in release_times(case):  # forces change: methods start afresh
+                        state = replace(state, continuation=None)
+                    if now >= self.end:
+                        break
+                case = self._begun(case, now, state)
+                motion = self._part(case, now, self._stop(case, now), state)
+        return self._joined(case, parts)
 
-    def _next(self, k: int, before: xarray.Dataset) -> Motion:
-        """Part number k, which goes on from the part before."""
-        state = initial_state(before)
-        if self.times[k] in release_times(self.case):  # forces change: methods start afresh
-            state = replace(state, continuation=None)
-        return self._part(k, state)
+    def _instants(self, case: Case, now: float, result: xarray.Dataset | None) -> dict[str, float]:
+        """Time (s) at which something was first reached, by the places that it releases."""
+        awaited = self._awaited(case, now)
+        if result is None or not awaited:
+            return {}
+        times, moved = result["time"].values.tolist(), result["displacement"].values
+        for k, (time, u) in enumerate(zip(times, moved, strict=True)):
+            reached = [(place, share) for place, share in awaited if share(u, time) >= 1.0]
+            if reached:
+                before, state = times[k - 1], initial_state(result, k - 1)
+                state = replace(state, continuation=None)
+                found = {
+                    place: self._instant(case, (before, time), state, share, share(u, time))
+                    for place, share in reached
+                }
+                first = min(found.values())
+                near = first + ALIKE * (time - before)
+                return {place: first for place, instant in found.items() if instant <= near}
+        return {}
+
+    def _instant(
+        self, case: Case, span: tuple[float, float], state: State, share: Callable[..., float],
+        end: float,
+    ) -> float:  # fmt: skip
+        """Time (s) between two samples at which something is reached, from the first one's state.
+
+        end : share that the second sample has reached.
+        """
+
+        def beyond(time: float) -> float:
+            if time == span[1]:
+                return end - 1.0
+            if time == span[0]:
+                return share(state.displacement, time) - 1.0
+            last = self._part(case, span[0], time, state, watched=False).run()
+            return share(last["displacement"].values[-1], time) - 1.0
+
+        with quietly():
+            return float(brentq(beyond, *span, xtol=EXACT * (span[1] - span[0])))  # type: ignore
 
     def _tell(self, report: Reporter, now: float, own: Progress) -> None:
-        start, end = self.times[0], self.times[-1]
-        report(own._replace(time=now - start + own.time, duration=end - start))
+        report(own._replace(time=now - self.start + own.time, duration=self.end - self.start))
 
     # ------------------------------------------------------------------ one result
-    def _joined(self, parts: Sequence[xarray.Dataset]) -> xarray.Dataset:
-        """One result of the parts; the sample at the instant of a release is that just after it."""
-        case, pieces = self.case, list[xarray.Dataset]()
-        names = audited(case.energy_groups, case.air is not None)
-        for now, part in zip(self.times, parts, strict=False):
-            own = self._placed(part, now)
+    def _joined(self, case: Case, found: Sequence[tuple[float, xarray.Dataset]]) -> xarray.Dataset:
+        """One result of the parts; the sample at the instant of a release is that just after it.
+
+        case : the case with the times of all releases.
+        found : the parts, each with the time (s) at which it begins.
+        """
+        pieces, parts = list[xarray.Dataset](), [part for _, part in found]
+        names, between = audited(case.energy_groups, case.air is not None), self._between(case)
+        for now, part in found:
+            acts = partial(stays, time=now)
+            own = placed(case, part, acts, _factors, WATCH)
             if pieces:
                 _go_on(own, pieces[-1], names)
             pieces.append(own)
         rows = [
-            own.isel(time=slice(int(now in self.between), None if own is pieces[-1] else -1))
-            for own, now in zip(pieces, self.times, strict=False)
+            own.isel(time=slice(int(now in between), None if own is pieces[-1] else -1))
+            for own, (now, _) in zip(pieces, found, strict=True)
         ]
-        whole = xarray.concat(rows, "time").drop_vars(["support", "plane"], errors="ignore")
+        whole = xarray.concat(rows, "time")
         whole = whole.isel(time=slice(None, None, self.every or 1))
         attributes = [part.attrs for part in parts]
         facts = {
@@ -146,9 +243,11 @@ class ReleasedMotion(InMemory):
         energy = np.stack([whole[name] for name in names], axis=1)
         scale, off = energy_scale(energy, case.air is not None), energy_error(energy)
         facts |= {"interval": self.interval} if self.interval else {"every_steps": self.every}
+        at = [f"{place} at t = {time:.9g} s" for place, time in released_at(case).items()]
         facts |= {
-            "duration": self.times[-1] - self.times[0],
-            "dt": (self.times[-1] - self.times[0]) / max(1, facts["steps"]),
+            "duration": self.end - self.start,
+            "dt": (self.end - self.start) / max(1, facts["steps"]),
+            "releases": "; ".join(at),
             "energy_error": float(np.abs(off).max()) / scale if scale else 0.0,
         }
         first, last = parts[0], parts[-1]
@@ -156,33 +255,29 @@ class ReleasedMotion(InMemory):
         ends |= {name: first[name] for name in ("continued_from",) if name in first}
         data = {name: (own.dims, own.values, own.attrs) for name, own in {**ends, **whole}.items()}
         along = {"time": ("time", whole["time"].values, first["time"].attrs)}
-        result = result_dataset("trajectory", case, data, along, facts, stage_times(facts))
+        result = result_dataset("trajectory", self.case, data, along, facts, stage_times(facts))
         stride = -(-whole.sizes["time"] // max(1, facts["crossing_looks"]))
         return crossings_of(case, whole["displacement"].values, stride).recorded(result)
 
-    def _placed(self, part: xarray.Dataset, now: float) -> xarray.Dataset:
-        """Samples of a part from a time (s) on, as the whole case has them: 0 where released."""
-        case, own = self.case, part[[name for name in part if "time" in part[name].dims]]
-        dofs = 3 * part["support_node"].values + np.searchsorted(AXIS, part["support_axis"])
-        own = own.drop_vars(["support_node", "support_axis"]).assign_coords(support=dofs)
-        own = own.reindex(support=case.reaction_dofs, fill_value=0.0)
-        planes = case.contact.planes if case.contact else ()
-        if "plane" in own.dims:
-            acting = [k for k, plane in enumerate(planes) if stays(plane, now)]
-            own = own.assign_coords(plane=acting).reindex(plane=range(len(planes)), fill_value=0.0)
-        sizes = {**own.sizes, "plane": len(planes)}
-        for name, one in {**energies_of(case), **forces_inside(case)}.items():
-            dims = ("time", *one.dims)
-            if name == "tension":  # also of springs, where no bar or cable is left
-                acts = [stays(support, now) for support, *_ in case.polylines()]
-                states = [own[name].values for name in ("displacement", "velocity", "time")]
-                pulls = [cast(Any, one.function)(*state) for state in zip(*states, strict=True)]
-                own = own.drop_vars(name, errors="ignore")
-                own[name] = variable(dims, np.array(pulls) * acts, one.units, one.text)
-            elif name not in own:
-                zero = np.zeros([sizes[dim] for dim in dims])
-                own[name] = variable(dims, zero, one.units, one.text)
-        return own
+
+def _run(
+    motion: Motion, report: Reporter
+) -> tuple[xarray.Dataset | None, ComputationError | MotionInterrupted | None]:
+    """Result of a motion or, if it fails, of the part computed so far, with the error."""
+    try:
+        return motion.run(report), None
+    except (ComputationError, MotionInterrupted) as error:
+        return error.partial, error
+
+
+def _factors(time: float) -> Callable[[Any], float]:
+    """Function from a history to its factor at a time (s)."""
+    return lambda history: float(history(time))
+
+
+def _share_at(share: Callable[..., float], u: NDArray, time: float) -> float:
+    """See `Reached.share`, at a time (s)."""
+    return share(u, _factors(time))
 
 
 def _together(key: str, values: Sequence[Any]) -> Any:
@@ -206,7 +301,8 @@ def _go_on(own: xarray.Dataset, before: xarray.Dataset, names: Sequence[str]) ->
 def prepare_released(
     case: Case, duration: float, prepare: Callable[..., Motion], start: float = 0.0,
     initial: State | None = None, dt: float | None = None, every_steps: int | None = None,
-    interval: float | None = None, kept: bool = False, **given: Any,
+    interval: float | None = None, sample: Mapping[str, Any] | None = None, kept: bool = False,
+    **given: Any,
 ) -> ReleasedMotion:  # fmt: skip
     """Check the input of a motion with releases; see `driver.prepare`, which is `prepare`.
 
@@ -214,17 +310,11 @@ def prepare_released(
     """
     every, span = timing.sampling(duration, every_steps, interval)
     count = math.floor(duration / span * (1.0 + 1e-12) + SAME) if span else 1
-    end = start + count * (span or duration)
-    within = {time: (time - start) / (span or math.inf) for time in release_times(case)}
-    within = {time: steps for time, steps in within.items() if start < time < end}
-    off = {time: steps for time, steps in within.items() if abs(steps - round(steps)) > SAME}
-    beside = {
-        start + near(steps) * span for steps in off.values() for near in (math.floor, math.ceil)
-    }
-    times = tuple(sorted({start, end, *within, *beside}))
     dt = None if dt is None else number("dt", dt, above=0.0)
-    own = partial(prepare, **given)
-    motion = ReleasedMotion(case, own, times, frozenset(off), span, every, dt, initial)
+    motion = ReleasedMotion(
+        case, partial(prepare, **given), start, start + count * (span or duration), span, every, dt,
+        initial, check_given(sample),
+    )  # fmt: skip
     _ = motion.first  # refuses what is wrong before anything is computed
     timing.check_samples(
         motion.expected_samples, len(case.structure.nodes), len(case.reaction_dofs)

@@ -45,9 +45,7 @@ class Sampler:
     """
 
     def __init__(self, case: Case, given: Any, u: NDArray, v: NDArray, start: float) -> None:
-        if not isinstance(given, Mapping):
-            raise InputError(f" = {show(given)}: give functions by name, as {{'tip': f}}", "sample")
-        structure, own = case.structure, forces_inside(case)
+        structure, given, own = case.structure, check_given(given), forces_inside(case)
         taken = {*TAKEN, *case.energy_groups, *own}
         sizes = {"node": len(structure.nodes), "axis": 3, "support": len(case.reaction_dofs)}
         self._quantities: dict[str, tuple[Quantity, tuple[int, ...]]] = {}  # with their shapes
@@ -114,6 +112,13 @@ class Sampler:
             column[: len(values)] = np.reshape(values, (-1, *shape))
             columns[name] = column
         return columns
+
+
+def check_given(sample: Any) -> Mapping[str, Any]:
+    """The argument `sample` of `simulate`, with the types checked; empty for None."""
+    if not isinstance(sample, Mapping | None):
+        raise InputError(f" = {show(sample)}: give functions by name, as {{'tip': f}}", "sample")
+    return sample or {}
 
 
 def _value(quantity: Quantity, u: NDArray, v: NDArray, time: float) -> NDArray:

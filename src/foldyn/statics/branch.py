@@ -87,7 +87,7 @@ def switch_branch(
     if way.rule is None:
         raise InputError(f" = {method!r}: a branch takes 'arc_length' or 'mgdcm'", "method")
     problem = problem_of(path, case, at)
-    until = until_of(until, problem.case.structure)
+    until = until_of(until, problem.case)
     solver = Solver(problem, settings_of(settings))
     crossing = station_of(solver, problem, path, at)
     facts = {

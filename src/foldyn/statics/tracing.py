@@ -15,8 +15,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence, Sized
-from dataclasses import dataclass
-from typing import Annotated, Any
+from typing import Any
 
 import numpy as np
 import xarray
@@ -25,14 +24,13 @@ from scipy import sparse
 
 from foldyn.algebra.solvers import check_fill, factorized
 from foldyn.algebra.superlu import Factorization
-from foldyn.arguments import Check
-from foldyn.cases import Case, Gravity, State, resolve_nodes
+from foldyn.cases import Case, Gravity, State
 from foldyn.cases.constraints import check_tied
 from foldyn.cases.contact_checks import check_contact, check_driven
-from foldyn.cases.decode import Part, PartOf
-from foldyn.cases.directions import AXES, Axis
+from foldyn.cases.directions import AXES
+from foldyn.cases.reached import REACHED, Reached
 from foldyn.cases.releases import refuse_releases
-from foldyn.errors import InputError
+from foldyn.errors import InputError, within
 from foldyn.mechanics.term import Unstrained
 from foldyn.ram_limit import check_memory
 from foldyn.statics.equilibrium import AdaptiveLoad, OrigamiProblem, drives, is_actuated, is_moved
@@ -43,8 +41,7 @@ from foldyn.statics.recording import record
 from foldyn.statics.rigid import name_rigid_motions
 from foldyn.statics.stability import softest_modes
 from foldyn.statics.stepping import Point, Walk, kept, settle, walk
-from foldyn.structures.discretized import Discretized
-from foldyn.values import choice, flag, function, indices, number, of_kind, show, single, whole
+from foldyn.values import choice, flag, function, indices, of_kind, show, single, whole
 
 SHORTEST = 1e-3  # least length of a bar at the start of a path, relative to its rest length
 LOOKS = 51  # load factors between two given ones at which supports and planes are checked
@@ -59,48 +56,13 @@ MOVED = 0.3  # nodes that move more than this fraction of the largest motion are
 MOST_NAMED = 8
 
 
-@dataclass(frozen=True)
-class Reached(Part):
-    """Whether a node has reached a displacement along an axis.
-
-    Parameters
-    ----------
-    node : int
-        Number of the node.
-    axis : {"x", "y", "z"}
-        Axis along which it moves.
-    displacement : float
-        Displacement (m) from the rest position, not zero; reached once the node is at least as far
-        from zero, on the same side.
-    """
-
-    node: Annotated[int, Check(whole)]
-    axis: Axis
-    displacement: Annotated[float, Check(number, unit="m")]
-
-    def agree(self) -> None:
-        """Refuse a displacement of zero, where the path begins."""
-        if self.displacement == 0.0:
-            raise InputError(" = 0: the path begins there; say where it ends", "displacement")
-
-    def __call__(self, displacement: NDArray, load_factor: float) -> bool:
-        """Whether displacements (n, 3), m, reach it."""
-        return bool(displacement[self.node, AXES.index(self.axis)] / self.displacement >= 1.0)
-
-
-UNTIL = PartOf((Reached,), "analysis.until", "node, axis and displacement")
-"""End condition of a path, in a case file and as an argument."""
-
-
-def until_of(given: Any, structure: Discretized) -> Callable[[NDArray, float], bool] | None:
-    """End condition of a path: a function as given, a table as `Reached`."""
-    if given is None:
-        return None
-    if callable(given) and not isinstance(given, Reached):
-        return given  # type: ignore[return-value]
-    end = given if isinstance(given, Reached) else UNTIL("until", given)
-    resolve_nodes(structure, (end.node,), "until.node")
-    return end
+def until_of(given: Any, case: Case) -> Callable[[NDArray, float], bool] | None:
+    """End condition of a path: a function as given, or what is reached there."""
+    if given is None or callable(given):
+        return given
+    with within("until."):
+        share = (given if isinstance(given, Reached) else REACHED("until", given)).share(case)
+    return lambda displacement, factor: share(displacement, lambda history: factor) >= 1.0
 
 
 def trace(
@@ -211,7 +173,7 @@ def trace(
     steady = constant_numbers(case, constant)
     displacement = None if initial is None else displacement_of(initial, case, "initial")
     _check_case(case, plan, steady, adaptive_load is not None)
-    until = until_of(until, case.structure)
+    until = until_of(until, case)
     settings = settings_of(settings)
     function("adaptive_load", adaptive_load)
     function("progress", progress)
