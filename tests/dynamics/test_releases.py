@@ -386,7 +386,6 @@ def refused():
     driven = fd.Case(FLAP, [*HINGED, fd.Fix(TIP, until=1.0)], [drive], fd.Rayleigh(alpha=1.0))
     linear = fd.Case(shell, [fd.Fix([4, 5]), fd.Fix([0], until=1.0)], DOWN)
     return {
-        "path": lambda: fd.trace(case),
         "many": lambda: fd.simulate_many([case], 0.1, interval=0.01),
         "superelements": lambda: fd.simulate(linear, 2.0),
         "random": lambda: fd.random_response(case, base={"x": noise}),

@@ -244,7 +244,7 @@ def test_case_files_and_stored_results(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "old, new, message",
+    ("old", "new", "message"),
     [
         ("crease = 0", "crease = 4", r"supports\[2\]\.until\.crease.*4"),
         ("angle = 300.7", "angle = 400", r"supports\[2\]\.until\.angle = 400"),
@@ -262,7 +262,7 @@ def test_files_are_told_what_is_wrong(tmp_path, old, new, message):
 
 
 @pytest.mark.parametrize(
-    "until, message",
+    ("until", "message"),
     [
         ({"node": 2, "axis": "z", "displacement": 0.0}, r"displacement = 0: is reached at rest"),
         ({"node": 20, "axis": "z", "displacement": 1.0}, r"supports\[2\]\.until\.node.*20"),

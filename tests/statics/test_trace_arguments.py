@@ -51,7 +51,7 @@ def case():
         ({"until": 0.1}, "until = 0.1: must be a table"),
         ({"until": {"node": 2, "axis": "z"}}, "until.displacement: missing"),
         ({"until": {"node": 9, "axis": "z", "displacement": 1.0}}, "until.node = .*out of range"),
-        ({"until": {"node": 2, "axis": "z", "displacement": 0}}, "the path begins there"),
+        ({"until": {"node": 2, "axis": "z", "displacement": 0}}, "is reached at rest"),
         ({"inertia_relief": 1}, "True or False"),
         ({"inertia_relief": True}, "needs the mass"),
         ({"case": STUCK}, "nothing can move"),

@@ -9,7 +9,7 @@ from typing import Any
 
 from foldyn.cases.directions import AXES
 from foldyn.cases.latches import Latch
-from foldyn.cases.reached import Reached
+from foldyn.cases.reached import Reached, ReachedTension
 from foldyn.cases.supports import BaseMotion, Fix
 from foldyn.errors import InputError, within
 from foldyn.values import show
@@ -43,6 +43,20 @@ def release_times(case: Any) -> list[float]:
 def waiting(case: Any) -> dict[str, Reached]:
     """What is reached where parts of a case are released, by their places."""
     return {place: part.until for place, part in _released(case) if isinstance(part.until, Reached)}
+
+
+def awaited(case: Any, time: float) -> dict[str, Callable[..., float]]:
+    """What a case waits for just after a time (s), by the places: see `Reached.share`.
+
+    Nothing waits for the tension of what is released itself.
+    """
+    found = waiting(case)
+    gone = [not stays(support, time) for support, *_ in case.polylines()] if found else []
+    return {
+        place: until.share(case)
+        for place, until in found.items()
+        if not (isinstance(until, ReachedTension) and gone[until.line])
+    }
 
 
 def stays(part: Any, time: float) -> bool:

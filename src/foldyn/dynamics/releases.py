@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from foldyn.cases import Case, State
-from foldyn.cases.reached import ReachedTension
-from foldyn.cases.releases import release_times, released, released_at, stays, timed, waiting
+from foldyn.cases.releases import awaited, release_times, released, released_at, stays, timed
 from foldyn.dynamics import timing
 from foldyn.dynamics.audit import AIR, AUDITED, audited, energy_error, energy_scale
 from foldyn.dynamics.in_memory import InMemory
@@ -103,18 +102,9 @@ class ReleasedMotion(InMemory):
     def _begun(self, case: Case, now: float, state: State | None) -> Case:
         """The case without what a state releases at once."""
         u = (state or State()).of_nodes("displacement", case.structure.nodes.shape)
-        while reached := [place for place, share in self._awaited(case, now) if share(u, now) >= 1]:
+        while reached := _reached(awaited(case, now), u, now):
             case = timed(case, dict.fromkeys(reached, now))
         return case
-
-    def _awaited(self, case: Case, now: float) -> list[tuple[str, Callable[..., float]]]:
-        """What a case waits for now: the place, and a function of displacements and time (s)."""
-        gone = [not stays(support, now) for support, *_ in case.polylines()]
-        return [
-            (place, partial(_share_at, until.share(case)))
-            for place, until in waiting(case).items()
-            if not (isinstance(until, ReachedTension) and gone[until.line])
-        ]
 
     def _part(
         self, case: Case, now: float, stop: float, state: State | None, watched: bool = True
@@ -123,11 +113,11 @@ class ReleasedMotion(InMemory):
         length, dt = stop - now, self.longest
         if dt is not None and abs(length - round(length / dt) * dt) > SAME * length:
             dt = length / math.ceil(length / dt)
-        sample, awaited = self.sample, self._awaited(case, now) if watched else ()
-        if awaited:
+        sample, shares = self.sample, awaited(case, now) if watched else {}
+        if shares:
 
             def watch(u: NDArray, v: NDArray, time: float) -> float:
-                return math.nan if any(share(u, time) >= 1.0 for _, share in awaited) else 0.0
+                return math.nan if _reached(shares, u, time) else 0.0
 
             sample = {**sample, WATCH: watch}
         return self.prepare(
@@ -152,13 +142,16 @@ class ReleasedMotion(InMemory):
         case = self._begun(self.case, now, state)
         with told_once():
             while True:
-                result, error = _run(motion, partial(self._tell, report, now))
-                if error and (times := self._instants(case, now, result)):
-                    case = timed(case, times)
-                elif error:
-                    if result is not None and result.sizes["time"]:
-                        error.partial = self._joined(case, [*parts, (now, result)])
-                    raise error
+                try:
+                    result = motion.run(partial(self._tell, report, now))
+                except (ComputationError, MotionInterrupted) as error:
+                    ended = isinstance(error, ComputationError)
+                    if ended and (times := self._instants(case, now, error.partial)):
+                        case = timed(case, times)
+                    else:
+                        if error.partial is not None and error.partial.sizes["time"]:
+                            error.partial = self._joined(case, [*parts, (now, error.partial)])
+                        raise
                 else:
                     parts.append((now, result))
                     now, state = self._stop(case, now), initial_state(result)
@@ -172,42 +165,40 @@ class ReleasedMotion(InMemory):
 
     def _instants(self, case: Case, now: float, result: xarray.Dataset | None) -> dict[str, float]:
         """Time (s) at which something was first reached, by the places that it releases."""
-        awaited = self._awaited(case, now)
-        if result is None or not awaited:
+        shares = awaited(case, now)
+        if result is None or not shares:
             return {}
         times, moved = result["time"].values.tolist(), result["displacement"].values
-        for k, (time, u) in enumerate(zip(times, moved, strict=True)):
-            reached = [(place, share) for place, share in awaited if share(u, time) >= 1.0]
-            if reached:
-                before, state = times[k - 1], initial_state(result, k - 1)
-                state = replace(state, continuation=None)
-                found = {
-                    place: self._instant(case, (before, time), state, share, share(u, time))
-                    for place, share in reached
-                }
-                first = min(found.values())
-                near = first + ALIKE * (time - before)
-                return {place: first for place, instant in found.items() if instant <= near}
-        return {}
+        reached = [_reached(shares, *at) for at in zip(moved, times, strict=True)]
+        if not any(reached):
+            return {}
+        k, places = next((k, places) for k, places in enumerate(reached) if places)
+        state = replace(initial_state(result, k - 1), continuation=None)
+        found = {
+            place: self._instant(case, times[k - 1 : k + 1], state, shares[place])
+            for place in places
+        }
+        near = min(found.values()) + ALIKE * (times[k] - times[k - 1])
+        return {place: min(found.values()) for place, time in found.items() if time <= near}
 
     def _instant(
-        self, case: Case, span: tuple[float, float], state: State, share: Callable[..., float],
-        end: float,
-    ) -> float:  # fmt: skip
+        self, case: Case, span: Sequence[float], state: State, share: Callable[..., float]
+    ) -> float:
         """Time (s) between two samples at which something is reached, from the first one's state.
 
-        end : share that the second sample has reached.
+        The motion may start otherwise than it went on: if it is late, the second sample counts.
         """
 
         def beyond(time: float) -> float:
-            if time == span[1]:
-                return end - 1.0
-            if time == span[0]:
-                return share(state.displacement, time) - 1.0
-            last = self._part(case, span[0], time, state, watched=False).run()
-            return share(last["displacement"].values[-1], time) - 1.0
+            u = state.displacement
+            if time > span[0]:
+                part = self._part(case, span[0], time, state, watched=False).run()
+                u = part["displacement"].values[-1]
+            return share(u, _factors(time)) - 1.0
 
         with quietly():
+            if beyond(span[1]) < 0.0:
+                return span[1]
             return float(brentq(beyond, *span, xtol=EXACT * (span[1] - span[0])))  # type: ignore
 
     def _tell(self, report: Reporter, now: float, own: Progress) -> None:
@@ -260,24 +251,14 @@ class ReleasedMotion(InMemory):
         return crossings_of(case, whole["displacement"].values, stride).recorded(result)
 
 
-def _run(
-    motion: Motion, report: Reporter
-) -> tuple[xarray.Dataset | None, ComputationError | MotionInterrupted | None]:
-    """Result of a motion or, if it fails, of the part computed so far, with the error."""
-    try:
-        return motion.run(report), None
-    except (ComputationError, MotionInterrupted) as error:
-        return error.partial, error
-
-
 def _factors(time: float) -> Callable[[Any], float]:
     """Function from a history to its factor at a time (s)."""
     return lambda history: float(history(time))
 
 
-def _share_at(share: Callable[..., float], u: NDArray, time: float) -> float:
-    """See `Reached.share`, at a time (s)."""
-    return share(u, _factors(time))
+def _reached(shares: Mapping[str, Callable[..., float]], u: NDArray, time: float) -> list[str]:
+    """Places of what is released at displacements (n, 3), m, and a time (s)."""
+    return [place for place, share in shares.items() if share(u, _factors(time)) >= 1.0]
 
 
 def _together(key: str, values: Sequence[Any]) -> Any:

@@ -31,7 +31,7 @@ def placed(
     *without : str
         Variables to leave out.
     """
-    along = part["displacement"].dims[0]
+    along = str(part["displacement"].dims[0])
     own = part[[name for name in part if along in part[name].dims and name not in without]]
     dofs = 3 * part["support_node"].values + np.searchsorted(AXIS, part["support_axis"])
     own = own.drop_vars(["support_node", "support_axis"]).assign_coords(support=dofs)

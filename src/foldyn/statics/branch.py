@@ -139,6 +139,8 @@ def problem_of(path: xarray.Dataset, case: Case | None, at: int) -> OrigamiProbl
     case = case_of(path) if case is None else of_kind("case", case, Case)
     if "elapsed" in path and case.remembering:
         raise InputError("path: its creases have relaxed in part; trace it without a duration")
+    if path.attrs.get("releases"):
+        raise InputError("path: has released parts of its case; trace it without those")
     displacement = path["displacement"].values[at]
     if displacement.shape != case.structure.nodes.shape:
         raise InputError(

@@ -136,12 +136,14 @@ def record(
     stations: Walk, progress: Callable[[Point], None] | None, solver: Solver,
     problem: OrigamiProblem, facts: dict[str, Any],
     until: Callable[[NDArray, float], bool] | None = None, adaptive: bool = False,
+    watch: Callable[[NDArray, float], Any] | None = None,
 ) -> xarray.Dataset:  # fmt: skip
     """Follow a path and make its dataset; if it stops early, raise with the part computed.
 
     facts : the arguments of the run, stored as attributes.
     until : whether the path ends, given displacements (n, 3) and load factor.
     adaptive : whether an adaptive load acts.
+    watch : as `until`, from the first point on; nothing is told of what it does not see.
     """
     began = time.perf_counter()
     points: list[Point] = []
@@ -157,11 +159,12 @@ def record(
             points.append(station.point)
             if progress is not None:
                 progress(station.point)
-            if until is not None and len(points) > 1:
-                moved = problem.displacement(station.point.u).copy()
-                if until(moved, station.point.factor):
-                    until = None
-                    break
+            at = problem.displacement(station.point.u).copy(), station.point.factor
+            if until is not None and len(points) > 1 and until(*at):
+                until = None
+                break
+            if watch is not None and watch(*at):
+                return dataset("complete")  # type: ignore[return-value]
     except PathStoppedError as stop:
         remedy = _closed(problem, points) or stop.remedy
         if remedy == REMEDY_COLLISION and locks(problem.structure.fold_law):

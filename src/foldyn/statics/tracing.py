@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Iterator, Mapping, Sequence, Sized
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -29,7 +30,7 @@ from foldyn.cases.constraints import check_tied
 from foldyn.cases.contact_checks import check_contact, check_driven
 from foldyn.cases.directions import AXES
 from foldyn.cases.reached import REACHED, Reached
-from foldyn.cases.releases import refuse_releases
+from foldyn.cases.releases import released_at, waiting
 from foldyn.errors import InputError, within
 from foldyn.mechanics.term import Unstrained
 from foldyn.ram_limit import check_memory
@@ -38,6 +39,7 @@ from foldyn.statics.newton import Settings, Solver, settings_of
 from foldyn.statics.path_memory import FOLLOWED, flowing
 from foldyn.statics.path_methods import METHODS, PathPlan, along, plan_path
 from foldyn.statics.recording import record
+from foldyn.statics.releases import JUMP, trace_released
 from foldyn.statics.rigid import name_rigid_motions
 from foldyn.statics.stability import softest_modes
 from foldyn.statics.stepping import Point, Walk, kept, settle, walk
@@ -56,7 +58,7 @@ MOVED = 0.3  # nodes that move more than this fraction of the largest motion are
 MOST_NAMED = 8
 
 
-def until_of(given: Any, case: Case) -> Callable[[NDArray, float], bool] | None:
+def until_of(given: Any, case: Case) -> Callable[[NDArray, float], Any] | None:
     """End condition of a path: a function as given, or what is reached there."""
     if given is None or callable(given):
         return given
@@ -164,26 +166,55 @@ def trace(
     >>> path.displacement.sel(node=0, axis="x").values.round(4).tolist()
     [-0.0176, -0.0348]
     """
-    two = "trace up to there, and go on without this part from initial = fd.initial_state(path)"
-    refuse_releases(of_kind("case", case, Case), "a path, which has no time,", two)
+    for place, time in released_at(of_kind("case", case, Case)).items():
+        raise InputError(
+            f" = {time:g}: a path has no time: give what is reached then, as in "
+            'until = { node = 6, axis = "z", displacement = -0.03 }',
+            f"{place}.until",
+        )
     choice("method", method, METHODS)
     if steps is not None:
         check_steps(steps, case.structure.nodes.size)
-    plan, timed = plan_path(method, load_factors, steps, first_step, duration), duration is not None
+    plan = plan_path(method, load_factors, steps, first_step, duration)
+    if waiting(case) and plan.durations:
+        raise InputError(": a path that takes time releases nothing; leave it out", "duration")
     steady = constant_numbers(case, constant)
-    displacement = None if initial is None else displacement_of(initial, case, "initial")
     _check_case(case, plan, steady, adaptive_load is not None)
-    until = until_of(until, case)
-    settings = settings_of(settings)
-    function("adaptive_load", adaptive_load)
-    function("progress", progress)
-    inertia_relief = flag("inertia_relief", inertia_relief)
+    given = {
+        "method": method,
+        "steps": plan.steps,
+        "load_factors": load_factors,
+        "duration": duration,
+        "first_step": plan.first_step if plan.method.rule is not None else None,
+        "constant": steady or None,
+        "inertia_relief": flag("inertia_relief", inertia_relief),
+    }
+    until, adaptive_load = until_of(until, case), function("adaptive_load", adaptive_load)
+    settings, progress = settings_of(settings), function("progress", progress)
+    follow = partial(_follow, given, until, adaptive_load, settings, progress)
+    if waiting(case):
+        return trace_released(follow, case, plan, initial, until)
+    return follow(case, plan, initial)
+
+
+def _follow(
+    given: Mapping[str, Any], until: Any, adaptive_load: AdaptiveLoad | None, settings: Settings,
+    progress: Callable[[Point], None] | None, case: Case, plan: PathPlan, initial: State | None,
+    watch: Callable[[NDArray, float], Any] | None = None,
+) -> xarray.Dataset:  # fmt: skip
+    """Path by a plan; see `trace`.
+
+    given : facts about the run.
+    watch : whether the path ends, as `until`, but also at its first point.
+    """
+    timed, steady = given["duration"] is not None, given["constant"] or ()
+    displacement = None if initial is None else displacement_of(initial, case, "initial")
     check_fill(case.structure.fill, case.body.size)
     memory = case.memory_in(initial)
     if isinstance(memory, np.ndarray):  # it covers all branches: select those that evolve
         memory = memory[flowing(case, timed)]
     problem = OrigamiProblem(
-        case, steady, displacement, adaptive_load, inertia_relief,
+        case, steady, displacement, adaptive_load, given["inertia_relief"],
         flow=FOLLOWED, memory=memory, timed=timed,
     )  # fmt: skip
     begin = 0.0 if initial is None else plan.begin
@@ -193,28 +224,24 @@ def trace(
     problem.begin(begin)
     refuse_mechanisms(problem, begin)
     solver = Solver(problem, settings)
-    facts = {
-        "method": method,
-        "steps": plan.steps,
-        "load_factors": load_factors,
-        "duration": duration,
-        "first_step": plan.first_step if plan.method.rule is not None else None,
-        "constant": steady or None,
-        "inertia_relief": inertia_relief,
-        "started_from": "rest" if initial is None else "state",
-    }
+    facts = {**given, "started_from": "rest" if initial is None else "state"}
 
     def stations() -> Walk:
-        start = settle(solver, problem.start(begin), begin)
+        u = problem.start(begin)
+        start = settle(solver, u, begin)
         if initial is None and not steady:  # energy released by the sheet without loads is not work
             problem.energy_at_rest = float(problem.energies(start.point.u, begin).sum())
+        if watch is not None:  # work of the loads up to the first point
+            forces = problem.working(u, begin) + problem.working(start.point.u, begin)
+            facts[JUMP] = float(0.5 * forces @ (start.point.u - u))
         first = kept(problem, start)
         if first.point.factor != plan.begin:
             *_, first = walk(solver, first, [plan.begin], False)
         yield first
         yield from along(solver, first, plan)
 
-    return record(stations(), progress, solver, problem, facts, until, adaptive_load is not None)
+    adaptive = adaptive_load is not None
+    return record(stations(), progress, solver, problem, facts, until, adaptive, watch)
 
 
 def check_steps(steps: Any, dofs: int) -> None:
