@@ -89,7 +89,9 @@ FEATURES: Mapping[str, Make] = {
             fd.Cable([5, 7, (3, 1, 1)], 1.0, change=-0.01, history=fd.Ramp(DURATION), friction=0.2)
         ]
     ),
-    "releases": lambda s: s.case(supports=[fd.Bar([(5, 7)], 1.0, until=DURATION / 2)]),
+    "releases": lambda s: s.case(
+        supports=[fd.Bar([(5, 7)], 1.0, until={"line": 0, "tension": 1.0})]
+    ),
     "end stops": lambda s: s.case(supports=[fd.Stop([0], 150.0, stiffness=1e-3, side="below")]),
     "damped end stops": lambda s: s.case(
         supports=[fd.Stop([0], 299.9, stiffness=1e-3, damping=1e-6)]
@@ -145,7 +147,6 @@ REASONS: Mapping[str, tuple[str, str]] = {
         "load factors that the method finds may turn back, so that no step has a time in which "
         "creases creep",
     ),
-    "e": ("releases nothing", "a path has no time at which something is released: trace two"),
 }
 """Why something is refused: what its message holds, and the words of the page."""
 

@@ -51,8 +51,8 @@ class Plane(Part):
         multiplied by the load factor.
     history : History or callable, optional
         Factor of the motion over time; constant by default.
-    until : float, optional
-        Time (s), above 0, at which a motion removes the plane; see `Fix`.
+    until : float or mapping, optional
+        When the plane is removed; see `Fix`.
 
     Examples
     --------

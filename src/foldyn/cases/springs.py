@@ -149,8 +149,8 @@ class Spring(Connector, Elastic):
         Factor of time of this change; constant by default. In paths, the load factor instead.
     stiffness_history : History or callable, optional
         Factor of time of k, for motions; constant by default.
-    until : float, optional
-        Time (s), above 0, at which a motion releases the springs; see `Fix`.
+    until : float or mapping, optional
+        When the springs are released; see `Fix`.
     """
 
     stiffness: Annotated[float, Check(number, above=0.0, unit="N/m")]
@@ -220,8 +220,8 @@ class Bar(Elastic):
         with more than its buckling load, pi^2 EI / L^2 (Euler).
     mass : float
         Mass (kg) of each bar, spread evenly along it: m/6 [2 1; 1 2] at its ends.
-    until : float, optional
-        Time (s), above 0, at which a motion releases the bars; see `Fix`.
+    until : float or mapping, optional
+        When the bars are released; see `Fix`.
     """
 
     between: Annotated[Pairs, Key("bar")]
@@ -307,8 +307,8 @@ class Cable(Elastic):
         cable slides and turns by the angle a, the tensions are in the ratio exp(mu a).
     sliding_speed : float
         Speed (m/s) below which friction fades, above 0: much below it, the cable creeps.
-    until : float, optional
-        Time (s), above 0, at which a motion releases the cable; see `Fix`.
+    until : float or mapping, optional
+        When the cable is released; see `Fix`.
 
     Notes
     -----

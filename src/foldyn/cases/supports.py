@@ -38,9 +38,11 @@ class Fix(Part):
     along : bool
         Whether to hold also the edges between these nodes, along their whole length. If edges of
         bars and hinges may bow, the held edges must be among the edges `straight` of `discretize`.
-    until : float, optional
-        Time (s), above 0, at which a motion lets the nodes go, counted as by histories. Analyses
-        without time take the nodes as held.
+    until : float or mapping, optional
+        When the nodes are let go: a time (s) of motions, above 0, counted as by histories; or what
+        is reached then in a motion or a path: {"node": 6, "axis": "z", "displacement": -0.03} (m
+        from rest), {"crease": 3, "angle": 170} (degrees) or {"line": 0, "tension": 40} (N, as
+        in `tension` of results). Other analyses take the nodes as held.
     """
 
     nodes: Nodes
@@ -86,8 +88,8 @@ class Impose(Part):
     along : bool
         Whether to move also the edges between these nodes, each like the straight line between its
         ends; see `Fix`.
-    until : float, optional
-        Time (s), above 0, at which a motion releases the nodes; see `Fix`.
+    until : float or mapping, optional
+        When the nodes are released; see `Fix`.
     """
 
     nodes: Nodes
@@ -171,8 +173,8 @@ class Link(Part):
         Instead of axes: three nodes that span a plate. `nodes` must lie in its plane and move as
         points of it: u = w1 u1 + w2 u2 + w3 u3, with the weights that hold for positions at rest.
         This is exact for any motion of a plate that stays flat.
-    until : float, optional
-        Time (s), above 0, at which a motion releases the nodes; see `Fix`.
+    until : float or mapping, optional
+        When the nodes are released; see `Fix`.
     """
 
     nodes: Nodes

@@ -161,7 +161,7 @@ def simulate(
     or, if the damping has state = "initial", in the state where the motion began: the initial
     displacement or, if `initial` is a sample of a motion, the start of that motion. Dashpots
     between nodes and damped creases follow the motion. Supports and planes with `until` are
-    released at that time: the motion goes on without them, and what they had stored is dissipated.
+    released then: the motion goes on without them, and what they had stored is dissipated.
     """
     keeping = None if store is None else check_keeping(store, checkpoint, resume)
     if store is None and flag("resume", resume):

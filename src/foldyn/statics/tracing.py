@@ -86,7 +86,9 @@ def trace(
     """Follow the equilibria of a case along a load factor.
 
     The factor multiplies the case's forces, gravity, imposed displacements and actuations;
-    histories and base motions are ignored.
+    histories and base motions are ignored. Supports and planes with `until` are released at the
+    first point where that is reached: the next point is the equilibrium without them at the same
+    load factor, and what is lost on the way is `dissipated`.
 
     Parameters
     ----------
@@ -116,9 +118,9 @@ def trace(
         Change of the factor in the first step of "mgdcm" and "arc_length" (default 0.05, or this
         fraction of the range to the last factor); the next steps are about as long.
     until : callable or mapping, optional
-        Function of displacements (n, 3) and load factor, or {"node": 6, "axis": "z",
-        "displacement": -0.03} for a nodal displacement (m); the path ends at the first point at
-        which it is true.
+        The path ends at the first point where this is reached: {"node": 6, "axis": "z",
+        "displacement": -0.03} (m), {"crease": 3, "angle": 170} (degrees) or {"line": 0, "tension":
+        40} (N), or where a function of displacements (n, 3) and load factor is true.
     adaptive_load : callable, optional
         Further forces (n, 3), N, as a function of displacements (n, 3) and load factor.
     inertia_relief : bool
