@@ -60,7 +60,9 @@ class Mark(NamedTuple):
         for lines in self.lines:
             scene.add_segments(axes, lines, self.color, self.width, self.dashes, self.zorder)
         if len(self.triangles):
-            add_triangles(axes, self.triangles, self.color, self.zorder + 0.5)
+            look = {"facecolors": self.color, "edgecolors": "white", "linewidths": 0.4}
+            filled = Poly3DCollection(self.triangles, zorder=self.zorder + 0.5, **look)
+            axes.add_collection3d(filled, autolim=False)
         if len(self.dots):
             look = {"linestyle": "none", "color": self.color, "zorder": self.zorder, **self.look}
             axes.plot(*self.dots.T, **look)
@@ -160,15 +162,6 @@ def arc_arrows(arcs: Points, size: float, view: View) -> tuple[Points, Points]:
     along /= np.linalg.norm(along, axis=1, keepdims=True)
     heads = billboard(arcs[:, -1] + 0.5 * size * along, along, size, 0.4 * size, view)
     return np.stack([arcs[:, :-1], arcs[:, 1:]], axis=2).reshape(-1, 2, 3), heads
-
-
-def add_triangles(axes: Axes3D, triangles: Points, color: str, zorder: float) -> Poly3DCollection:
-    """Fill mark triangles (count, 3, 3) in one color."""
-    marks = Poly3DCollection(
-        triangles, facecolors=color, edgecolors="white", linewidths=0.4, zorder=zorder
-    )
-    axes.add_collection3d(marks, autolim=False)
-    return marks
 
 
 class Labels:
