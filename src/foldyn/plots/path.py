@@ -112,15 +112,11 @@ def plot_reaction(
     """
     paths = readings.by_label("paths", paths)
     numbers, direction = readings.asked(paths, nodes, direction)
-    curves = [
-        _Curve(
-            label if len(paths) > 1 else "",
-            readings.along(path, numbers, direction),
-            readings.total_reaction(path, numbers, direction=direction),
-            path,
-        )
-        for label, path in paths.items()
-    ]
+    curves = []
+    for label, path in paths.items():
+        x = readings.along(path, numbers, direction)
+        force = readings.total_reaction(path, numbers, direction=direction)
+        curves.append(_Curve(label if len(paths) > 1 else "", x, force, path))
     xlabel = f"imposed displacement along {direction} (m)"
     return _draw(curves, title, xlabel, f"force along {direction} (N)")
 
