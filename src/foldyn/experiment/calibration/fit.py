@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,11 +44,6 @@ class Point(NamedTuple):
     values: tuple[float, ...]
     runs: tuple[int, ...] | None = None
     second: bool = False
-
-
-def stamp(digest: str, point: Point) -> list[Any]:
-    """Everything that an evaluation depends on."""
-    return [digest, *point]
 
 
 def evaluate(problem: Problem, point: Point) -> Evaluation:
@@ -246,10 +241,10 @@ class _Search:
         self.run = np.repeat([runs[i] for i in range(len(observed))], [len(o) for o in observed])
 
     def _evaluations(self, made: Problem, pool: Pool) -> Evaluations[Point]:
-        self.all.append(
-            Evaluations[Point](pool, partial(stamp, made.digest()), self.folder, self._tell)
-        )
-        return self.all[-1]
+        digest = made.digest()
+        new = Evaluations[Point](pool, lambda point: [digest, *point], self.folder, self._tell)
+        self.all.append(new)
+        return new
 
     @property
     def count(self) -> int:
