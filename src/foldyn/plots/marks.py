@@ -202,9 +202,8 @@ class Labels:
         written.set_path_effects([withStroke(linewidth=2.0, foreground="white")])
         written.set_gid(f"label {text}")
         around = np.array([[0.0, 0.0], [0.5, 0.0], [-0.5, 0.0], [0.0, 0.5], [0.0, -0.5]])
-        self._taken = np.vstack(
-            [self._taken, spots[best] + 0.9 * self._distance * around * stretch]
-        )
+        covered = spots[best] + 0.9 * self._distance * around * stretch
+        self._taken = np.vstack([self._taken, covered])
 
 
 def along_lines(segments: Points, samples: int = 9) -> Points:

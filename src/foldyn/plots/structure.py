@@ -220,12 +220,8 @@ def _turns(sheet: Sheet3D, points: Points, length: float, sight: View) -> list[M
     shares = load_curves.moments(sheet.case)
     if not shares:
         return []
-    drawn = [
-        marks.arc_arrows(
-            load_curves.crease_arcs(sheet.case, points, share, 0.6 * length), 0.22 * length, sight
-        )
-        for share in shares
-    ]
+    arcs = [load_curves.crease_arcs(sheet.case, points, share, 0.6 * length) for share in shares]
+    drawn = [marks.arc_arrows(each, 0.22 * length, sight) for each in arcs]
     look = {"color": style.LOAD, "marker": ">", "markersize": 6.0, "linewidth": 1.8}
     keys = [style.key(load_curves.describe_moment(share), **look) for share in shares]
     pieces, heads = (np.concatenate(parts) for parts in zip(*drawn, strict=True))

@@ -277,9 +277,8 @@ def _likeness(results: Results, cases: Mapping[str, Case]) -> list[list[float | 
     if len(counts) > 1:
         return None
     (count,) = counts
-    every = np.concatenate(
-        [r["shape"].transpose("mode", "node", "axis").values[:, :count] for r in results.values()]
-    )
+    shapes = [one["shape"].transpose("mode", "node", "axis").values for one in results.values()]
+    every = np.concatenate([each[:, :count] for each in shapes])
     rows = mac(every, every).round(3).tolist()
     return [[value if np.isfinite(value) else None for value in row] for row in rows]
 

@@ -132,9 +132,8 @@ def about_waves(result: xr.Dataset, triangles: int) -> dict[str, Any]:
     }  # fmt: skip
     if "state" in result.dims:
         own = result["state"].attrs
-        unit = {"degrees": "°"}.get(
-            own.get("units", ""), f" {own['units']}" if "units" in own else ""
-        )
+        word = f" {own['units']}" if "units" in own else ""
+        unit = "°" if word == " degrees" else word
         about |= {
             "states": result["state"].values.tolist(), "varied": own["long_name"], "unit": unit,
         }  # fmt: skip

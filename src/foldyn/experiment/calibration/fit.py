@@ -310,9 +310,9 @@ class _Search:
             change = ((fine - coarse) * self.weight)[self.chosen]
             shift = known.influence @ change / (1.0 - 0.5**finer.order)
             large = np.abs(shift) > known.standard_error
-            doubt = (
-                self._doubt(finer, values, shift, known) if large.any() else np.zeros(len(large))
-            )
+            doubt = np.zeros(len(large))
+            if large.any():
+                doubt = self._doubt(finer, values, shift, known)
             doubt[~(doubt > known.standard_error)] = 0.0
             for k in np.flatnonzero(large):
                 _warn(

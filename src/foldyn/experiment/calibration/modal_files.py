@@ -233,9 +233,7 @@ def _columns(
         f"{node} {part}": (f"node {node} {axis} {part}", base) for node in nodes for part in parts
     }
     table = read_numbers(file, {"frequency": ("frequency", "Hz"), **fields}, gaps=[*fields])
-    columns = {
-        part: np.stack([table[f"{node} {part}"] for node in nodes], axis=1) for part in parts
-    }
+    columns = {p: np.stack([table[f"{node} {p}"] for node in nodes], axis=1) for p in parts}
     values = (
         columns["magnitude"] if "magnitude" in parts else columns["real"] + 1j * columns["imag"]
     )
