@@ -139,10 +139,8 @@ class Space:
 
     def values(self, point: ArrayLike) -> dict[str, float | NDArray]:
         """Values of the parameters of a design."""
-        return {
-            name: part if self.shapes[name] else float(part[0])
-            for name, part in self.parts(np.array(point)).items()
-        }
+        parts = self.parts(np.array(point)).items()
+        return {name: part if self.shapes[name] else float(part[0]) for name, part in parts}
 
     @property
     def entries(self) -> list[str]:

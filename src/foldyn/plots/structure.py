@@ -178,10 +178,8 @@ def _motions(sheet: Sheet3D, points: Points, length: float, sight: View) -> list
         middle = points[moved.any(axis=1)].mean(axis=0)
         text = load_curves.describe_vector("base moved", peak, "m")
         base.append((middle[None], peak[None], text))
-    return [
-        *_arrows(imposed, length, sight, style.IMPOSED),
-        *_arrows(base, length, sight, style.BASE),
-    ]
+    moved = _arrows(imposed, length, sight, style.IMPOSED)
+    return [*moved, *_arrows(base, length, sight, style.BASE)]
 
 
 def _dashpots(sheet: Sheet3D, points: Points, size: float, sight: View) -> list[Mark]:

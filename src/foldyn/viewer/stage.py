@@ -262,11 +262,9 @@ def _more(
     first = next(iter(results.values()))
     usual = "coefficient" if kind == "periodic" else "displacement"
     name = quantity_of(first) if kind == "response" else usual
-    moved = [
-        np.abs(result[name].sel(node=nodes[:1] or [0]).transpose(..., "axis").values)
-        for result in results.values()
-    ]
-    largest = np.max([each.reshape(-1, 3).max(axis=0) for each in moved], axis=0)
+    shown = nodes[:1] or [0]
+    moved = [one[name].sel(node=shown).transpose(..., "axis").values for one in results.values()]
+    largest = np.max([np.abs(each).reshape(-1, 3).max(axis=0) for each in moved], axis=0)
     more = about_orbits(first) if kind == "periodic" else {}
     return {"axis": int(largest.argmax()), "unit": first[name].attrs.get("units", ""), **more}
 
