@@ -198,9 +198,8 @@ class Labels:
         shift = spots[best] - anchor
         place = point + shift[0] * self._view.basis[0] + shift[1] * self._view.basis[1]
         look = {"fontsize": size, "color": color, "ha": "center", "va": "center", "zorder": 20}
-        written = self._axes.text(*place, text, **look)
-        written.set_path_effects([withStroke(linewidth=2.0, foreground="white")])
-        written.set_gid(f"label {text}")
+        halo = [withStroke(linewidth=2.0, foreground="white")]
+        self._axes.text(*place, text, path_effects=halo, gid=f"label {text}", **look)
         around = np.array([[0.0, 0.0], [0.5, 0.0], [-0.5, 0.0], [0.0, 0.5], [0.0, -0.5]])
         covered = spots[best] + 0.9 * self._distance * around * stretch
         self._taken = np.vstack([self._taken, covered])
