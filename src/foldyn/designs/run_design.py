@@ -268,12 +268,10 @@ def _found(
         amount = one.violation(float(difference))
         violations[one.text] = amount if amount > slack else 0.0
     if not best.feasible:
-        violated = ", ".join(
-            f"{text} by {amount:.3g}" for text, amount in violations.items() if amount
-        )
+        violated = [f"{text} by {amount:.3g}" for text, amount in violations.items() if amount]
         warn(
-            f"none of {len(search.rows)} designs is feasible; the nearest one violates {violated}. "
-            "Widen the bounds, relax constraints, or take more searches",
+            f"none of {len(search.rows)} designs is feasible; the nearest one violates "
+            f"{', '.join(violated)}. Widen the bounds, relax constraints, or take more searches",
             "design-optimization.md#what-comes-back",
         )
     elif _insensitive(search, best) and not ends[best.search].converged:

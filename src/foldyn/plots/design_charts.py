@@ -42,6 +42,5 @@ def slope_chart(slopes: Mapping[str, ArrayLike], objective: str) -> Chart:
     names: Sequence[str] = list(slopes)
     sizes = np.array([np.linalg.norm(one) if np.ndim(one) else one for one in slopes.values()])
     dots = Curve("", np.arange(len(names)), sizes, dots=True)
-    return Chart(
-        "parameter", f"change of {objective} over the range", [dots], words=names, zero=True
-    )
+    label = f"change of {objective} over the range"
+    return Chart("parameter", label, [dots], words=names, zero=True)

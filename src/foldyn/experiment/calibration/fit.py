@@ -414,9 +414,8 @@ class _Search:
 def _width(finer: Finer, doubt: float) -> str:
     """Describe how far the interval of a coarse model can be trusted."""
     if not doubt:
-        where = (
-            "" if finer.proof is not finer.problem else f", if its error has order {finer.order}"
-        )
+        proven = finer.proof is not finer.problem
+        where = "" if proven else f", if its error has order {finer.order}"
         return f"The interval is wide enough for both{where}"
     return (
         f"A finer {finer.what} disagrees with that by {doubt:.2g}: the interval is wider by "

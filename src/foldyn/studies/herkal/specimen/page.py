@@ -274,9 +274,8 @@ def _vibrations(front: xr.Dataset, data: Data) -> list[Section]:
     curves = {f"{data.label}, as filmed": at["whole"]}
     if "true" in front:
         curves[f"{data.label}, its true motion"] = at["true"]
-    curves |= {
-        f"model: {name}": at["model"].sel(support=key) for key, name in SUPPORT_NAMES.items()
-    }
+    for key, name in SUPPORT_NAMES.items():
+        curves[f"model: {name}"] = at["model"].sel(support=key)
     found = {name: evaluation.vibration_of(x.values, step) for name, x in curves.items()}
     paper = read_targets("specimen")
     frequency, damping = (paper[f"release_{name}"].value for name in ("frequency", "damping"))
