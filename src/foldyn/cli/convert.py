@@ -95,9 +95,7 @@ def _export(given: argparse.Namespace, what: Path | Case) -> None:
     _refuse(given, PATTERNS_ONLY, "pattern files")
     if isinstance(given.frame, str):
         raise InputError(f" = {given.frame}: give the number of a sample, from 0", "--frame")
-    options = {
-        name: getattr(given, name) for name in (*RESULTS_ONLY, *DECKS_ONLY, "scale", "frame")
-    }
+    options = {key: getattr(given, key) for key in (*RESULTS_ONLY, *DECKS_ONLY, "scale", "frame")}
     try:
         files = export(what, given.out, **options)
     except InputError as error:

@@ -39,12 +39,11 @@ TIED = [fd.Link("xmax", "xz")]
 MOVING = [fd.BaseMotion("z", PULSE, 0.05), fd.Impose("xmax", "z", -0.1, RISE)]
 TURNING = [fd.Temperature(20.0, 1e-3, 5e-3, history=RISE), fd.Actuate([0], fraction=0.1)]
 FOLLOWING = [fd.Pressure(500.0, history=RISE), fd.CreaseMoment("all", 20.0, RISE)]
-DAMPED = [fd.Rayleigh(1.0, 1e-5), fd.StrainDamping(1e-5)]
+DAMPED, MODAL = [fd.Rayleigh(1.0, 1e-5), fd.StrainDamping(1e-5)], fd.ModalDamping(0.05, 4)
 DASHPOTS = [fd.Dashpot(50.0, "xmax"), fd.Dashpot(50.0, between=[(0, 6), (2, 8)])]
 PRONY, PLASTIC = partial(fd.Prony, [0.5], [0.02]), partial(fd.Plastic, 0.05)
-GROUND = fd.Plane(
-    (0.0, 0.0, -0.012), (0.0, 0.0, 1.0), friction=0.3, motion=(0.01, 0.0, 0.05), history=RISE
-)
+BELOW, UP, RISING = (0.0, 0.0, -0.012), (0.0, 0.0, 1.0), (0.01, 0.0, 0.05)
+GROUND = fd.Plane(BELOW, UP, friction=0.3, motion=RISING, history=RISE)
 RUBBING, ON_GROUND = fd.Contact(friction=0.3), fd.Contact(planes=[GROUND])
 
 
@@ -140,9 +139,8 @@ TOUCHING: dict[str, Any] = {"pattern": sheets(), "start": (-0.6, 0.2, -1.0)}
 def differentiated(*methods: str, **parts: Any) -> None:
     """Differentiate motions and a frequency with respect to crease stiffness."""
     made, given = case(**parts), {"duration": STEPS * SHORT, "dt": SHORT}
-    fd.sensitivity(
-        made, ["fold_stiffness"], measures="frequency[2]", analysis={"kind": "modes", "count": 2}
-    )
+    modes = {"kind": "modes", "count": 2}
+    fd.sensitivity(made, ["fold_stiffness"], measures="frequency[2]", analysis=modes)
     for method in methods:
         motion = {"kind": "dynamics", "method": method, **given}
         fd.sensitivity(made, ["fold_stiffness"], measures="displacement[8,z]", analysis=motion)
@@ -201,7 +199,7 @@ STAGES: Sequence[Uses] = (
             accompanied,
             partial(moved, *IMPLICIT, supports=[*WOUND, *TIED], damping=DAMPED),
             partial(moved, *IMPLICIT, supports=MOVING, loads=[*TURNING, *FOLLOWING]),
-            partial(moved, *IMPLICIT, damping=[fd.ModalDamping(0.05, 4)], supports=DASHPOTS),
+            partial(moved, *IMPLICIT, damping=[MODAL], supports=DASHPOTS),
         ],
         "laws with memory": [
             partial(moved, *REMEMBER, *IMPLICIT, law=PRONY, damping=[fd.CreaseDamping(0.2)]),
@@ -221,9 +219,7 @@ STAGES: Sequence[Uses] = (
             partial(moved, CONSERVING, membrane="bars"),
             partial(moved, CONSERVING, model="shell"),
             partial(moved, CONSERVING, supports=MOVING, loads=[*TURNING, *FOLLOWING]),
-            partial(
-                moved, CONSERVING, damping=[*DAMPED, fd.ModalDamping(0.05, 4)], supports=DASHPOTS
-            ),
+            partial(moved, CONSERVING, damping=[*DAMPED, MODAL], supports=DASHPOTS),
             partial(moved, CONSERVING, law=PRONY),
         ],
         "contact in implicit methods and paths": [

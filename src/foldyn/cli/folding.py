@@ -108,9 +108,8 @@ def _folded(pattern: Pattern, source: Path, given: Namespace) -> Folding:
     if given.angles is not None:
         angles = read_angles(given.angles)
     elif given.to_frame is not None:
-        angles = read_pattern(
-            source, **{**reading(given), "frame": given.to_frame, "flat_foldable": False}
-        )
+        options = {**reading(given), "frame": given.to_frame, "flat_foldable": False}
+        angles = read_pattern(source, **options)
     with progress_bar(given.quiet, total=given.steps, unit="step") as bar:
 
         def tell(step: int, steps: int) -> None:

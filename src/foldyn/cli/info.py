@@ -13,17 +13,9 @@ from foldyn.errors import InputError, optional
 from foldyn.studies import shipped_cases
 
 REQUIRED = (
-    "numpy",
-    "scipy",
-    "numba",
-    "xarray",
-    "h5netcdf",
-    "matplotlib",
-    "tqdm",
-    "shapely",
-    "svgelements",
+    "numpy", "scipy", "numba", "xarray", "h5netcdf", "matplotlib", "tqdm", "shapely", "svgelements",
     "defusedxml",
-)
+)  # fmt: skip
 
 
 def info() -> str:

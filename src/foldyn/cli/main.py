@@ -58,6 +58,7 @@ def parser() -> argparse.ArgumentParser:
     """Return the parser of the command line."""
     top = _Parser(prog="foldyn", description="Statics and dynamics of origami structures.")
     top.add_argument("--version", action="version", version=f"foldyn {__version__}")
+    top.set_defaults(model=None, force=True)  # of commands that lack these options
     commands = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
 
     run = commands.add_parser(
@@ -164,7 +165,6 @@ def parser() -> argparse.ArgumentParser:
         "that is of kind fidelity.",
     )
     _add_case(fidelity, "fidelity")
-    fidelity.set_defaults(model=None)
     add(fidelity, integer, {"--count": "how many modes (default: 6)"})
     add(fidelity, str, {
         "--reference MODEL": "what to compare with: superelements (default), or shell, which takes "
@@ -199,9 +199,7 @@ def parser() -> argparse.ArgumentParser:
 
 def _add_case(command: argparse.ArgumentParser, results: str) -> None:
     """Add the arguments of all commands on case files."""
-    command.add_argument(
-        "case", help="case file (TOML), or the name of a shipped one: see foldyn info"
-    )
+    add(command, str, {"case": "case file (TOML), or the name of a shipped one: see foldyn info"})
     add_results(command, f"NAME-{results}")
     add_figures(command)
 
@@ -216,7 +214,6 @@ def _add_kind(
         _add_common(command, kind, film)
     else:
         _add_case(command, kind)
-        command.set_defaults(model=None)
     return command
 
 
@@ -286,9 +283,7 @@ def _status(arguments: Sequence[str] | None, out: Outlet) -> int:
             warnings.showwarning = _Warnings(getattr(given, "case", ""))
             if getattr(given, "figures", None) and given.no_figures:
                 raise InputError("--figures: draws figures; leave out --no-figures")
-            told = given.command in ("info", "schema")
-            most = 1.0 if told or given.force else HALF
-            with at_most(most), noticed(getattr(given, "quiet", False)):
+            with at_most(1.0 if given.force else HALF), noticed(getattr(given, "quiet", False)):
                 _call(given)
     except (InputError, MemoryError) as error:
         return _say(reason(error), BAD_INPUT)

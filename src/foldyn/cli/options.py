@@ -84,9 +84,8 @@ def add_figures(command: argparse.ArgumentParser) -> None:
 
 def add_film(command: argparse.ArgumentParser) -> None:
     """Add the option for a film of the motion."""
-    command.add_argument(
-        "--film", choices=ANIMATIONS, help="write the motion as a film too, in this format"
-    )
+    text = "write the motion as a film too, in this format"
+    command.add_argument("--film", choices=ANIMATIONS, help=text)
 
 
 def add_switches(command: argparse.ArgumentParser, figures: bool = True) -> None:

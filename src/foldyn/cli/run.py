@@ -143,9 +143,7 @@ def _density(axis: str, *words: str) -> tuple[str, dict[str, Any]]:
     unit, *points = words or [""]
     pairs = [point.split(":") for point in points]
     try:
-        frequency, value = (
-            [float(number) for number in column] for column in zip(*pairs, strict=True)
-        )
+        frequency, value = ([*map(float, column)] for column in zip(*pairs, strict=True))
     except ValueError:
         raise InputError(
             f"--base {' '.join((axis, *words))}: write AXIS UNIT F:DENSITY F:DENSITY ..., as in z "

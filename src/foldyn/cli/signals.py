@@ -12,9 +12,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
 
-HEEDED = [
-    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)
-]
+ENDS = ("SIGINT", "SIGTERM", "SIGHUP")
+HEEDED = [getattr(signal, name) for name in ENDS if hasattr(signal, name)]
 
 
 class Endings:

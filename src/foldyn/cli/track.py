@@ -286,9 +286,9 @@ def _footage(
     options = ("model", "scale", "reference", "distance", "match", "nodes", "reach")
     settings = {name: str(value) for name in options if (value := getattr(given, name))}
     if film is None:
-        photos = [_jpeg(read_photo(name)) for name in given.inputs]
-        return Footage(given.inputs, dict(enumerate(photos)), figures, case, settings)
-    pictures = spread(tracks.sizes["time"], lambda frame: _jpeg(film.picture(frame)))
+        pictures = dict(enumerate(_jpeg(read_photo(name)) for name in given.inputs))
+    else:
+        pictures = spread(tracks.sizes["time"], lambda frame: _jpeg(film.picture(frame)))
     return Footage(given.inputs, pictures, figures, case, settings)
 
 

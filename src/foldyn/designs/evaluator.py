@@ -70,9 +70,8 @@ class Measured:
         width = self.space.values(self.space.upper - self.space.lower)
         sizes = {name: width[name] for name, value in values.items() if not np.any(value)}
         texts = [one.text for one in self.measures]
-        found = sensitivity(
-            self.build, dict(values), measures=texts, analysis=self.analysis, sizes=sizes
-        )
+        asked: dict[str, Any] = {"measures": texts, "analysis": self.analysis, "sizes": sizes}
+        found = sensitivity(self.build, dict(values), **asked)
         parts = [found[f"gradient_{name}"].values.reshape(len(texts), -1) for name in values]
         return found["value"].values, np.concatenate(parts, axis=1)
 

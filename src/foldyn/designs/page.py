@@ -121,10 +121,8 @@ def _ends(found: Design) -> Table:
          one.message] for one in found.ends
     ]  # fmt: skip
     header = ["search", "objective", "violation", "feasible", "evaluations", "why it ended"]
-    caption = (
-        f"{found.evaluations} evaluations in all. Violations are relative to the constraint's size."
-    )
-    return Table(header, rows, caption, digits=6)
+    beside = "Violations are relative to the constraint's size."
+    return Table(header, rows, f"{found.evaluations} evaluations in all. {beside}", digits=6)
 
 
 def _failures(found: Design) -> Iterator[Section]:

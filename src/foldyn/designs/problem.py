@@ -94,11 +94,9 @@ def problem_of(minimize: Any, maximize: Any, subject_to: Any) -> Problem:
         objective = parse(text)
         if not objective.measures:
             raise InputError(f' = "{text}": has no measure, so it is equal for all designs')
-    texts = (
-        [subject_to] if isinstance(subject_to, str) else listed("subject_to", subject_to, "texts")
-    )
+    asked = [subject_to] if isinstance(subject_to, str) else subject_to
     constraints = []
-    for k, text in enumerate(texts):
+    for k, text in enumerate(listed("subject_to", asked, "texts")):
         with within(f"subject_to[{k}]"):
             constraints.append(constraint(text))
     return Problem(objective, 1.0 if name == "minimize" else -1.0, tuple(constraints))
@@ -141,10 +139,8 @@ class Space:
 
     def values(self, point: ArrayLike) -> dict[str, float | NDArray]:
         """Values of the parameters of a design."""
-        return {
-            name: part if self.shapes[name] else float(part[0])
-            for name, part in self.parts(np.array(point)).items()
-        }
+        parts = self.parts(np.array(point)).items()
+        return {name: part if self.shapes[name] else float(part[0]) for name, part in parts}
 
     @property
     def entries(self) -> list[str]:

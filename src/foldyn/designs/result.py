@@ -102,9 +102,8 @@ class Design:
     def summary(self) -> dict[str, Any]:
         """All attributes except the history, as JSON types (nan becomes null)."""
         own = {name: value for name, value in vars(self).items() if name not in ("ends", "history")}
-        return plain(
-            {"foldyn_version": foldyn.__version__, **own, "ends": [vars(one) for one in self.ends]}
-        )
+        ends = [vars(one) for one in self.ends]
+        return plain({"foldyn_version": foldyn.__version__, **own, "ends": ends})
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the best design (``*.json``), or history and best design (``*.nc``, ``*.csv``).

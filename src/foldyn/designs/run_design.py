@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -21,7 +22,7 @@ from foldyn.designs.evaluator import Evaluate, Measured, Point, Source, measured
 from foldyn.designs.methods import METHODS, Settings, searched
 from foldyn.designs.problem import Problem, Space, problem_of, space_of
 from foldyn.designs.result import Design, End, history_of
-from foldyn.designs.search import Row, Search
+from foldyn.designs.search import Ended, Row, Search
 from foldyn.errors import ComputationError, InputError, warn
 from foldyn.sweeps.evaluations import Evaluation, Evaluations
 from foldyn.sweeps.pool import Here
@@ -220,7 +221,8 @@ def _first(plan: Plan, search: Search, number: int) -> NDArray:
     drawn = np.random.default_rng([plan.settings.seed, number])
     for _ in range(MOST_DRAWN - 1):
         x = drawn.random(len(plan.first))
-        if search.can(x):
+        with suppress(Ended):
+            search.at(x)
             return x
     return drawn.random(len(plan.first))
 
@@ -266,12 +268,10 @@ def _found(
         amount = one.violation(float(difference))
         violations[one.text] = amount if amount > slack else 0.0
     if not best.feasible:
-        violated = ", ".join(
-            f"{text} by {amount:.3g}" for text, amount in violations.items() if amount
-        )
+        violated = [f"{text} by {amount:.3g}" for text, amount in violations.items() if amount]
         warn(
-            f"none of {len(search.rows)} designs is feasible; the nearest one violates {violated}. "
-            "Widen the bounds, relax constraints, or take more searches",
+            f"none of {len(search.rows)} designs is feasible; the nearest one violates "
+            f"{', '.join(violated)}. Widen the bounds, relax constraints, or take more searches",
             "design-optimization.md#what-comes-back",
         )
     elif _insensitive(search, best) and not ends[best.search].converged:

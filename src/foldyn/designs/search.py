@@ -118,14 +118,6 @@ class Search:
         """Count an iteration of the method."""
         self.iteration += 1
 
-    def can(self, x: NDArray) -> bool:
-        """Whether a starting design can be computed."""
-        try:
-            self.at(x)
-        except Ended:
-            return False
-        return True
-
     def at(self, x: NDArray) -> Trial:
         """Evaluate a design.
 

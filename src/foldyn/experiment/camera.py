@@ -196,10 +196,8 @@ class Sight(NamedTuple):
         """The camera that took a film; None if the tracks do not describe it."""
         if "camera_depth" not in tracks:
             return None
-        there, way = (
-            np.array(tracks.attrs[f"camera_{name}"]) for name in ("position", "direction")
-        )
-        return cls(there, way, tracks["camera_depth"].values)
+        at, way = (np.array(tracks.attrs[f"camera_{name}"]) for name in ("position", "direction"))
+        return cls(at, way, tracks["camera_depth"].values)
 
     def seen(self, nodes: NDArray[np.int64], rest: NDArray, moved: NDArray) -> NDArray[np.float64]:
         """Apparent displacements (t, m, 3), in m, of nodes (m,) whose displacements are `moved`.

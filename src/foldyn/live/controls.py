@@ -76,11 +76,8 @@ def controls(document: Mapping[str, Any]) -> list[Control]:
 
     Keys left at their default are included; keys without any value are not.
     """
-    return [
-        *_of_pattern(document["pattern"]),
-        *_of_sheet(document.get("sheet", {})),
-        *_of_damping(document),
-    ]
+    pattern, sheet = document["pattern"], document.get("sheet", {})
+    return [*_of_pattern(pattern), *_of_sheet(sheet), *_of_damping(document)]
 
 
 def changed(

@@ -182,10 +182,11 @@ def dashpot_lines(case: cases.Case, points: Points, size: float, view: View) -> 
     """
     segments: list[Points] = []
     for place, dashpot in case.dashpots:
+        direction = dashpot.direction  # to the ground: along this, or else below the node
+        along = np.array([0.0, 0.0, -1.0]) if direction is None else unit_vector(direction)
         for a, b in dashpot.ends(case.structure, place).tolist():
-            grounded = b == GROUND
-            end = _grounded_end(dashpot, points[a], size) if grounded else points[b]
-            segments += _symbol(points[a], end, size, view, grounded)
+            end = points[a] + REACH * size * along if b == GROUND else points[b]
+            segments += _symbol(points[a], end, size, view, b == GROUND)
     return np.array(segments).reshape(-1, 2, 3)
 
 
@@ -193,13 +194,6 @@ def describe_dashpot(dashpot: cases.Dashpot) -> str:
     """Describe a dashpot in words: how strong it is, and what it connects."""
     to = "to the ground" if dashpot.between is None else "between nodes"
     return f"dashpot {dashpot.coefficient:.4g} N s/m {to}"
-
-
-def _grounded_end(dashpot: cases.Dashpot, node: Points, size: float) -> Points:
-    """Position of the grounded end: along the dashpot's direction, or else below the node."""
-    down = np.array([0.0, 0.0, -1.0])
-    along = down if dashpot.direction is None else unit_vector(dashpot.direction)
-    return node + REACH * size * along
 
 
 def _symbol(start: Points, end: Points, size: float, view: View, grounded: bool) -> list[Points]:

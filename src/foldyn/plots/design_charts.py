@@ -40,10 +40,7 @@ def convergence_charts(history: xr.Dataset) -> list[Chart]:
 def slope_chart(slopes: Mapping[str, ArrayLike], objective: str) -> Chart:
     """Change of an objective over the range of each parameter by its slope; for arrays the norm."""
     names: Sequence[str] = list(slopes)
-    sizes = np.array(
-        [float(np.linalg.norm(one)) if np.ndim(one) else one for one in slopes.values()]
-    )
+    sizes = np.array([np.linalg.norm(one) if np.ndim(one) else one for one in slopes.values()])
     dots = Curve("", np.arange(len(names)), sizes, dots=True)
-    return Chart(
-        "parameter", f"change of {objective} over the range", [dots], words=names, zero=True
-    )
+    label = f"change of {objective} over the range"
+    return Chart("parameter", label, [dots], words=names, zero=True)

@@ -131,10 +131,8 @@ def plot_path_energies(
     labels = ["strain energy (J)", "share"]
     figure, (upper, lower) = style.rows((7.0, 5.0), title, name, labels, heights=[1.8, 1.0])
     energies = readings.stacked(path)
-    names, colors = zip(
-        *((readings.strain_name(part), readings.strain_color(part)) for part in energies),
-        strict=True,
-    )
+    names = [readings.strain_name(part) for part in energies]
+    colors = [readings.strain_color(part) for part in energies]
     handles = upper.stackplot(x, *energies.values(), labels=names, colors=colors, alpha=0.75)
     work = path["work"].values
     work = float(sum(layer[0] for layer in energies.values())) + work - work[0]

@@ -47,9 +47,8 @@ def plot_fidelity(fidelity: Fidelity, title: str = "") -> Figure:
     result = fidelity.result
     frequency, error = result["frequency"].values, result["error"].values
     labels = ["error of the frequency (%)", "MAC"]
-    figure, (upper, lower) = style.rows(
-        (8.0, 5.6), title, f"frequency of {against(result)} (Hz)", labels, heights=[1.6, 1.0]
-    )
+    xlabel = f"frequency of {against(result)} (Hz)"
+    figure, (upper, lower) = style.rows((8.0, 5.6), title, xlabel, labels, heights=[1.6, 1.0])
     shown = np.append(error[np.isfinite(error)], [-2.0 * NEAR, 2.0 * NEAR]).clip(-MOST, MOST)
     bottom, top = 115.0 * shown.min(), 115.0 * shown.max()
     upper.axhspan(-100.0 * NEAR, 100.0 * NEAR, color="#EAF3EA", zorder=0.5)

@@ -109,9 +109,8 @@ def animate_folding(
     positions = _checked(folding).path["position"].values
     sheet, sight = _sheet(folding, positions[0]), View(*view)
     keys = edge_keys(sheet)
-    figure, axes = scene.view_figure(
-        positions.reshape(-1, 3), sight, title, -(-len(keys) // 3), _WIDTH
-    )
+    every, rows = positions.reshape(-1, 3), -(-len(keys) // 3)
+    figure, axes = scene.view_figure(every, sight, title, rows, _WIDTH)
     drawn = DrawnSheet(axes, sheet, positions[0], sight)
     scene.style.finish(figure, keys)
     with filmed(figure, path, fps) as writer:

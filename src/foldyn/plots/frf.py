@@ -194,11 +194,9 @@ def _set_axes(rows: NDArray, curves: list[Curve]) -> None:
     last = max(float(curve.frequency[-1]) for curve in curves)
     if last > first:
         phase.set_xlim(first, last)
-    phase.set_ylim(-195.0, 195.0)
-    phase.set_yticks([-180.0, -90.0, 0.0, 90.0, 180.0])
+    phase.set(ylim=(-195.0, 195.0), yticks=[-180.0, -90.0, 0.0, 90.0, 180.0])
     if len(rows) > 2:
-        rows[2].set_ylim(-0.05, 1.08)
-        rows[2].set_yticks([0.0, 0.5, 1.0])
+        rows[2].set(ylim=(-0.05, 1.08), yticks=[0.0, 0.5, 1.0])
 
 
 def _label_peaks(axes: Axes, peaks: NDArray[np.float64]) -> None:

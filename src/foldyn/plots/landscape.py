@@ -54,9 +54,8 @@ def plot_landscape(landscape: Landscape, title: str = "") -> Figure:
     """
     if not isinstance(landscape, Landscape):
         raise InputError(f" = {show(landscape)}: give what fd.landscape returns", "landscape")
-    figure, (upper, lower) = style.rows(
-        (7.0, 5.0), title, "stroke (m)", ["energy (J)", "force (N)"], heights=[1.4, 1.0]
-    )
+    names = ["energy (J)", "force (N)"]
+    figure, (upper, lower) = style.rows((7.0, 5.0), title, "stroke (m)", names, heights=[1.4, 1.0])
     stroke, force, energy = with_states(landscape)
     for axes, values in ((upper, energy), (lower, force)):
         axes.plot(stroke, values, color=style.BLUE, linewidth=1.4)

@@ -64,8 +64,7 @@ def plot_laws(
         else:
             for angle in np.asarray(rest.x):
                 axes.axvline(angle, color=style.GRAY, lw=0.8, linestyle=":", zorder=1)
-            axes.set_xlim(0.0, 360.0)
-            axes.set_xticks(np.arange(0, 361, 60))
+            axes.set(xlim=(0.0, 360.0), xticks=np.arange(0, 361, 60))
         axes.get_lines()[len(curves)].set(color=style.BLACK, markerfacecolor=style.BLACK, zorder=4)
         look = {"fontsize": style.NOTE, "handlelength": 2.2, **style.LEGEND}
         below = {"loc": "upper left", "bbox_to_anchor": (-0.2, -0.19), "borderaxespad": 0.0}

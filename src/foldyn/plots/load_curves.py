@@ -164,14 +164,13 @@ def _imposed(case: Case) -> list[tuple[float, str, Any]]:
 
 def _of_base(case: Case) -> list[tuple[float, str, Any]]:
     """Curves of motions of the base, one for each history and axis."""
-    return [
-        (float(value), f"base moved {value:.4g} m along {axis}", history)
-        for vectors, history in case.base_terms
-        for axis, value in zip(
-            "xyz", signed_peak(base_vectors(case, vectors)).tolist(), strict=True
-        )
-        if value
-    ]
+    found = []
+    for vectors, history in case.base_terms:
+        peak = signed_peak(base_vectors(case, vectors)).tolist()
+        for axis, value in zip("xyz", peak, strict=True):
+            if value:
+                found.append((float(value), f"base moved {value:.4g} m along {axis}", history))
+    return found
 
 
 def _rest_angles(case: Case) -> list[tuple[float, str, Any, float]]:

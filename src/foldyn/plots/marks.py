@@ -60,7 +60,9 @@ class Mark(NamedTuple):
         for lines in self.lines:
             scene.add_segments(axes, lines, self.color, self.width, self.dashes, self.zorder)
         if len(self.triangles):
-            add_triangles(axes, self.triangles, self.color, self.zorder + 0.5)
+            look = {"facecolors": self.color, "edgecolors": "white", "linewidths": 0.4}
+            filled = Poly3DCollection(self.triangles, zorder=self.zorder + 0.5, **look)
+            axes.add_collection3d(filled, autolim=False)
         if len(self.dots):
             look = {"linestyle": "none", "color": self.color, "zorder": self.zorder, **self.look}
             axes.plot(*self.dots.T, **look)
@@ -162,15 +164,6 @@ def arc_arrows(arcs: Points, size: float, view: View) -> tuple[Points, Points]:
     return np.stack([arcs[:, :-1], arcs[:, 1:]], axis=2).reshape(-1, 2, 3), heads
 
 
-def add_triangles(axes: Axes3D, triangles: Points, color: str, zorder: float) -> Poly3DCollection:
-    """Fill mark triangles (count, 3, 3) in one color."""
-    marks = Poly3DCollection(
-        triangles, facecolors=color, edgecolors="white", linewidths=0.4, zorder=zorder
-    )
-    axes.add_collection3d(marks, autolim=False)
-    return marks
-
-
 class Labels:
     """Places short texts next to points, each in the direction with most room.
 
@@ -205,13 +198,11 @@ class Labels:
         shift = spots[best] - anchor
         place = point + shift[0] * self._view.basis[0] + shift[1] * self._view.basis[1]
         look = {"fontsize": size, "color": color, "ha": "center", "va": "center", "zorder": 20}
-        written = self._axes.text(*place, text, **look)
-        written.set_path_effects([withStroke(linewidth=2.0, foreground="white")])
-        written.set_gid(f"label {text}")
+        halo = [withStroke(linewidth=2.0, foreground="white")]
+        self._axes.text(*place, text, path_effects=halo, gid=f"label {text}", **look)
         around = np.array([[0.0, 0.0], [0.5, 0.0], [-0.5, 0.0], [0.0, 0.5], [0.0, -0.5]])
-        self._taken = np.vstack(
-            [self._taken, spots[best] + 0.9 * self._distance * around * stretch]
-        )
+        covered = spots[best] + 0.9 * self._distance * around * stretch
+        self._taken = np.vstack([self._taken, covered])
 
 
 def along_lines(segments: Points, samples: int = 9) -> Points:

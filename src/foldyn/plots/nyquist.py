@@ -158,19 +158,16 @@ def _resonance(f: NDArray[np.float64], natural: float, ratio: float) -> NDArray[
 
 
 def _frames(count: int, curve: Curve, title: str) -> tuple[Figure, list[Axes]]:
-    columns = min(count, _COLUMNS)
+    columns, unit = min(count, _COLUMNS), unit_of("mobility")
     rows = -(-count // columns)
     figure = style.new_figure(max(3.0 * columns, 4.2), 0.9 + 2.9 * rows, title)
     frames = list(figure.subplots(rows, columns, squeeze=False).flat)
     for spare in frames[count:]:
         spare.remove()
     for k, frame in enumerate(frames[:count]):
-        first, last = k % columns == 0, k + columns >= count
-        style.frame(
-            frame,
-            f"real mobility{unit_of('mobility')}" if last else "",
-            f"imaginary mobility{unit_of('mobility')}" if first else "",
-        )
+        xlabel = f"real mobility{unit}" if k + columns >= count else ""
+        ylabel = f"imaginary mobility{unit}" if k % columns == 0 else ""
+        style.frame(frame, xlabel, ylabel)
         frame.axhline(0.0, color=style.GRAY, linewidth=0.6, zorder=1)
         frame.axvline(0.0, color=style.GRAY, linewidth=0.6, zorder=1)
     return figure, frames[:count]

@@ -112,15 +112,11 @@ def plot_reaction(
     """
     paths = readings.by_label("paths", paths)
     numbers, direction = readings.asked(paths, nodes, direction)
-    curves = [
-        _Curve(
-            label if len(paths) > 1 else "",
-            readings.along(path, numbers, direction),
-            readings.total_reaction(path, numbers, direction=direction),
-            path,
-        )
-        for label, path in paths.items()
-    ]
+    curves = []
+    for label, path in paths.items():
+        x = readings.along(path, numbers, direction)
+        force = readings.total_reaction(path, numbers, direction=direction)
+        curves.append(_Curve(label if len(paths) > 1 else "", x, force, path))
     xlabel = f"imposed displacement along {direction} (m)"
     return _draw(curves, title, xlabel, f"force along {direction} (N)")
 
@@ -139,14 +135,12 @@ def _draw(curves: list[_Curve], title: str, xlabel: str, ylabel: str) -> Figure:
     """Draw curves, with a legend of the marks that occur."""
     figure, axes = style.single((6.5, 4.4), title, xlabel, ylabel)
     axes.axhline(0.0, color=style.GRAY, linewidth=0.6, zorder=1)
-    colors = [style.CYCLE[index % len(style.CYCLE)] for index in range(len(curves))]
+    keys = []
     for index, curve in enumerate(curves):
-        _draw_curve(axes, curve, colors[index], 2.0 + 0.01 * index)
-    keys = [
-        style.key(curve.label, color=color, linewidth=1.4)
-        for curve, color in zip(curves, colors, strict=True)
-        if curve.label
-    ]
+        color = style.CYCLE[index % len(style.CYCLE)]
+        _draw_curve(axes, curve, color, 2.0 + 0.01 * index)
+        if curve.label:
+            keys.append(style.key(curve.label, color=color, linewidth=1.4))
     gray: dict[str, Any] = {"color": style.GRAY, "linewidth": 1.4}
     if any(not stretch.stable for curve in curves for stretch in readings.stretches(curve.path)):
         keys.append(style.key("stable", **gray))

@@ -182,11 +182,8 @@ def stretches(path: xr.Dataset) -> list[Stretch]:
     negative = path["negative_eigenvalues"].values
     stable = np.maximum(negative[:-1], negative[1:]) <= 0
     bounds = [0, *(np.flatnonzero(stable[1:] != stable[:-1]) + 1).tolist(), len(stable)]
-    return [
-        Stretch(start, stop, bool(stable[start]))
-        for start, stop in pairwise(bounds)
-        if start < stop
-    ]
+    ends = [(start, stop) for start, stop in pairwise(bounds) if start < stop]
+    return [Stretch(start, stop, bool(stable[start])) for start, stop in ends]
 
 
 def along(path: xr.Dataset, nodes: Sequence[int], direction: str) -> NDArray[np.float64]:

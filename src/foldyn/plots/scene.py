@@ -285,10 +285,8 @@ def _ticks(middle: Points, box: Points, basis: Points) -> list[NDArray]:
     # The axes meet in the corner nearest the viewer.
     corner = middle + 0.5 * box * np.where(basis[2] > 0.0, 1.0, -1.0)
     nearest = [int(np.abs(ticks[k] - corner[k]).argmin()) for k in (0, 1)]
-    apart = sum(
-        sign * (ticks[k][nearest[k]] - corner[k]) * basis[:2, k]
-        for k, sign in ((0, 1.0), (1, -1.0))
-    )
+    one, other = (ticks[k][nearest[k]] - corner[k] for k in (0, 1))
+    apart = one * basis[:2, 0] - other * basis[:2, 1]
     fuller = int(len(ticks[1]) > len(ticks[0]))
     if np.linalg.norm(apart) < _CLOSE and len(ticks[fuller]) > 1:
         ticks[fuller] = np.delete(ticks[fuller], nearest[fuller])

@@ -240,9 +240,8 @@ class DrawnSheet:
         triangles = self._sheet.triangles
         corners = scene.pieces(points, triangles)
         colors = scene.piece_colors(points, triangles, self._sheet.paper)
-        hidden = hidden_points(
-            corners.mean(axis=1), points, triangles, self._view, self._sheet.size
-        )
+        middles = corners.mean(axis=1)
+        hidden = hidden_points(middles, points, triangles, self._view, self._sheet.size)
         return [(corners[chosen], colors[chosen]) for chosen in (hidden, ~hidden)]
 
     def _split(self, edges: Indices, points: Points) -> tuple[Points, Points]:

@@ -205,11 +205,9 @@ def plot_transmission(
         if "phase" not in alone("attenuation", attenuation):
             raise InputError(": give what foldyn.linear.attenuation returns", "attenuation")
         phase = np.asarray(attenuation["phase"].values, complex)
-        waves = np.sort(np.where(np.isnan(phase), np.inf, np.imag(phase)), axis=1)
+        waves = np.sort(np.where(np.isfinite(phase), np.imag(phase), np.nan), axis=1)
         look = {"color": style.GRAY, "linewidth": 1.0, "zorder": 1.5}
-        lower.plot(
-            attenuation["frequency"].values, np.where(np.isinf(waves), np.nan, waves), **look
-        )
+        lower.plot(attenuation["frequency"].values, waves, **look)
         keys.append(style.key("waves of the repeated chain", **look))
     lower.set_ylim(-0.05 * top, 1.25 * top or 1.0)
     return style.finish(figure, keys)

@@ -61,9 +61,8 @@ def draw_stresses(
         A result without such a quantity; a state that it does not have.
     """
     of_kind("found", found, xr.Dataset)
-    named = {
-        name.removesuffix("_rms").removesuffix("_peak"): name for name in map(str, found.data_vars)
-    }
+    names = map(str, found.data_vars)
+    named = {name.removesuffix("_rms").removesuffix("_peak"): name for name in names}
     known = [name for name in QUANTITIES if name in named]
     if not known:
         raise InputError(": has no stresses; give a result of fd.stresses or fd.margins", "found")
@@ -72,14 +71,12 @@ def draw_stresses(
     name, sheet = named[chosen], Sheet3D.of(case_of(found))
     label = f"root mean square: {label}" if name.endswith("_rms") else label
     if chosen.endswith("margin"):
-        scale, shown = Normalize(-1.0, MOST), found[name].values
-        colors = ScalarMappable(scale, colormaps[MARGINS])
+        shown, scale, colors = found[name].values, Normalize(-1.0, MOST), MARGINS
     else:
         shown = _of_parts(found, name, on, state)
-        colors = ScalarMappable(
-            Normalize(0.0, float(shown.max(initial=0.0)) or 1.0), colormaps[RISING]
-        )
-    return draw_colored(sheet, on, shown, colors, label, View(*view), title)
+        scale, colors = Normalize(0.0, float(shown.max(initial=0.0)) or 1.0), RISING
+    colored = ScalarMappable(scale, colormaps[colors])
+    return draw_colored(sheet, on, shown, colored, label, View(*view), title)
 
 
 def _of_parts(found: xr.Dataset, name: str, on: str, state: int | None) -> NDArray[np.float64]:

@@ -178,10 +178,8 @@ def _motions(sheet: Sheet3D, points: Points, length: float, sight: View) -> list
         middle = points[moved.any(axis=1)].mean(axis=0)
         text = load_curves.describe_vector("base moved", peak, "m")
         base.append((middle[None], peak[None], text))
-    return [
-        *_arrows(imposed, length, sight, style.IMPOSED),
-        *_arrows(base, length, sight, style.BASE),
-    ]
+    moved = _arrows(imposed, length, sight, style.IMPOSED)
+    return [*moved, *_arrows(base, length, sight, style.BASE)]
 
 
 def _dashpots(sheet: Sheet3D, points: Points, size: float, sight: View) -> list[Mark]:
@@ -220,12 +218,8 @@ def _turns(sheet: Sheet3D, points: Points, length: float, sight: View) -> list[M
     shares = load_curves.moments(sheet.case)
     if not shares:
         return []
-    drawn = [
-        marks.arc_arrows(
-            load_curves.crease_arcs(sheet.case, points, share, 0.6 * length), 0.22 * length, sight
-        )
-        for share in shares
-    ]
+    arcs = [load_curves.crease_arcs(sheet.case, points, share, 0.6 * length) for share in shares]
+    drawn = [marks.arc_arrows(each, 0.22 * length, sight) for each in arcs]
     look = {"color": style.LOAD, "marker": ">", "markersize": 6.0, "linewidth": 1.8}
     keys = [style.key(load_curves.describe_moment(share), **look) for share in shares]
     pieces, heads = (np.concatenate(parts) for parts in zip(*drawn, strict=True))

@@ -94,9 +94,7 @@ def frame(axes: Axes, xlabel: str = "", ylabel: str = "", title: str = "") -> No
     axes.set_axisbelow(True)
     axes.tick_params(labelsize=TICK, color=GRAY, labelcolor=BLACK, direction="out")
     for side, spine in axes.spines.items():
-        spine.set_visible(side in ("left", "bottom"))
-        spine.set_color(GRAY)
-        spine.set_linewidth(0.8)
+        spine.set(visible=side in ("left", "bottom"), color=GRAY, linewidth=0.8)
 
 
 def rows(

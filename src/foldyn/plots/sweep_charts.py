@@ -11,15 +11,8 @@ from numpy.typing import NDArray
 
 from foldyn.errors import InputError
 from foldyn.plots.charts import Chart, Curve
-from foldyn.results.sweep_dataset import (
-    is_grid,
-    keys_of,
-    label,
-    main_effects,
-    measured,
-    measures_of,
-    parameters_of,
-)
+from foldyn.results import sweep_dataset
+from foldyn.results.sweep_dataset import label, measured, parameters_of
 from foldyn.values import choice
 
 MOST_LINES = 12  # largest number of curves in one chart
@@ -35,12 +28,13 @@ def line_chart(
     most: int = MOST_LINES,
 ) -> Chart:
     """Measure against one parameter, a curve for each value of another; see `plot_sweep_lines`."""
-    choice("measure", measure, measures_of(sweep))
+    choice("measure", measure, sweep_dataset.measures_of(sweep))
     names = [name for name in parameters_of(sweep) if name not in (at or {})]
     along = choice("x", x, names) if x is not None else (names or parameters_of(sweep))[0]
     others = [name for name in names if name != along]
-    own = [str(dim) for dim in sweep[measure].dims if dim not in (*keys_of(sweep), "point")]
-    grid = is_grid(sweep)
+    known = *sweep_dataset.keys_of(sweep), "point"
+    own = [str(dim) for dim in sweep[measure].dims if dim not in known]
+    grid = sweep_dataset.is_grid(sweep)
     if by is not None:
         choice("by", by, [*others, *own])
     elif grid and others:
@@ -71,7 +65,7 @@ def effect_charts(
     """Main effects on a measure, a chart for each parameter, optionally with the sweep's points."""
     found, charts = measured(sweep, measure, at), []
     check_some(found.values, measure)
-    for effect in main_effects(sweep, measure, at=at):
+    for effect in sweep_dataset.main_effects(sweep, measure, at=at):
         one = sweep[effect.name]
         across, words = places(effect.values)
         curves = [Curve("mean over everything else", across, effect.mean, spread=effect.deviation)]

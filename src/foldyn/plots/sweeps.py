@@ -73,9 +73,8 @@ def plot_sweep_map(
     missing = ~np.isfinite(values)
     if grid:
         mesh = np.ma.masked_invalid(values)
-        drawn = axes.pcolormesh(
-            across, down, mesh, cmap=_SHADES, shading="nearest", rasterized=True
-        )
+        look = {"cmap": _SHADES, "shading": "nearest", "rasterized": True}
+        drawn = axes.pcolormesh(across, down, mesh, **look)
         if min(values.shape) > 2 and np.ptp(mesh) > 0.0:
             lines = axes.contour(across, down, mesh, levels=6, colors=style.BLACK, linewidths=0.7)
             axes.clabel(lines, fontsize=style.NOTE, fmt=lambda value: f"{value:.4g}")

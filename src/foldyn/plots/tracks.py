@@ -161,8 +161,7 @@ def draw_overlay(
         )  # fmt: skip
     style.frame(axes, "u (pixels)", "v (pixels)")
     axes.grid(False)
-    axes.set_xlim(low[0], high[0])
-    axes.set_ylim(high[1], low[1])
+    axes.set(xlim=(low[0], high[0]), ylim=(high[1], low[1]))
     return style.finish(figure, keys, columns=4)
 
 

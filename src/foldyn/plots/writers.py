@@ -55,10 +55,8 @@ class GifWriter(PillowWriter):
             return
         palette = _common_palette(self._pictures)
         # Dithered paper would flicker and compress badly.
-        first, *others = (
-            picture.quantize(palette=palette, dither=Image.Dither.NONE)
-            for picture in self._pictures
-        )
+        look: dict[str, Any] = {"palette": palette, "dither": Image.Dither.NONE}
+        first, *others = (picture.quantize(**look) for picture in self._pictures)
         duration = round(1000 / self.rate)
         first.save(self.outfile, save_all=True, append_images=others, duration=duration, loop=0)
 

@@ -139,11 +139,9 @@ def by_mass_rule(
     results: ByRule, columns: Mapping[str, str | Callable[[xarray.Dataset], Any]], caption: str
 ) -> Table:
     """Table with a row for each mass rule; columns are attributes or functions of the result."""
-    rows = []
+    rows, asked = [], columns.values()
     for rule, result in results.items():
-        cells = (
-            result.attrs.get(of) if isinstance(of, str) else of(result) for of in columns.values()
-        )
+        cells = (result.attrs.get(of) if isinstance(of, str) else of(result) for of in asked)
         rows.append([rule, *cells])
     return Table(["mass rule", *columns], rows, caption, digits=3)
 

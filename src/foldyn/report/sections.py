@@ -107,10 +107,8 @@ class Table:
         for k, right in enumerate(numeric):
             cells = [self._cell(row[k]) for row in self.rows]
             columns.append(_aligned(cells) if right else [f"<td>{escape(c)}</td>" for c in cells])
-        titles = "".join(
-            f'<th scope="col"{k}>{escape(title)}</th>'
-            for title, k in zip(self.header, kind, strict=True)
-        )
+        heads = zip(self.header, kind, strict=True)
+        titles = "".join(f'<th scope="col"{k}>{escape(title)}</th>' for title, k in heads)
         body = "\n".join(f"<tr>{''.join(row)}</tr>" for row in zip(*columns, strict=True))
         return (
             f'<div class="table{"" if self.sorts else " kept"}"><table>{caption}\n'
@@ -253,10 +251,8 @@ def _aligned(cells: Sequence[str]) -> list[str]:
     longest = max(found, key=len, default="")
     lacks = [longest[len(tail) :] if text else "" for text, tail in zip(cells, found, strict=True)]
     fills = [f' data-lacks="{lack}"' if lack else "" for lack in lacks]
-    return [
-        f'<td class="number"{fill}>{escape(text)}</td>'
-        for text, fill in zip(cells, fills, strict=True)
-    ]
+    filled = zip(cells, fills, strict=True)
+    return [f'<td class="number"{fill}>{escape(text)}</td>' for text, fill in filled]
 
 
 def cell(value: float) -> float | None:

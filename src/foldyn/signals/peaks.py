@@ -174,9 +174,8 @@ class Curve(NamedTuple):
         bent = 2.0 * a * (1.0 + v) + (1.0 - self.order) * steep  # g'
         moved = ((1.0 + v) * slope - self.order * part) / bent  # -dv / dp_i
         frequency, height = self.peak(index)
-        return PeakSlopes(
-            -0.5 * frequency / (1.0 + v) * moved * by_size, -0.5 * height / value * part * by_size
-        )
+        by_place = -0.5 * frequency / (1.0 + v) * moved * by_size
+        return PeakSlopes(by_place, -0.5 * height / value * part * by_size)
 
     def stiffness_parabola(self, index: int) -> tuple[float, float, float, float]:
         """Parabola a v^2 + b v + c through the squared dynamic stiffness at three samples.

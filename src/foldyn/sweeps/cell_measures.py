@@ -97,12 +97,7 @@ def _property(name: str, result: xr.Dataset, case: Case, **labels: str) -> float
 
 PROPERTIES = {
     name: Measure(
-        name,
-        (EFFECTIVE,),
-        partial(_property, name),
-        units,
-        doc,
-        takes=takes,
+        name, (EFFECTIVE,), partial(_property, name), units, doc, takes=takes,
         needs=0 if takes in ((), ("plane",)) else 1,
     )
     for takes, rows in {
@@ -129,15 +124,12 @@ PROPERTIES = {
             ("twisting_modulus", "N m", "moment of twist of the sheet per unit of twist"),
             ("axial_stiffness", "N", "EA of the chain"),
             ("torsional_stiffness", "N m2", "GJ of the chain"),
-            (
-                "density",
-                "",
-                "mass per area of the sheet, length of the chain, or volume of the solid",
-            ),
+            ("density", "",
+             "mass per area of the sheet, length of the chain, or volume of the solid"),
         ),
     }.items()
     for name, units, doc in rows
-}
+}  # fmt: skip
 """Measures of the equivalent plate, beam or solid by name."""
 OF_CELLS |= PROPERTIES
 

@@ -124,9 +124,8 @@ def _read(file: Path) -> tuple[str, Evaluation]:
     if not sound(file):
         raise ValueError
     with np.load(file) as kept:
-        values = {
-            name.removeprefix(_VALUE): kept[name] for name in kept.files if name.startswith(_VALUE)
-        }
+        names = [name for name in kept.files if name.startswith(_VALUE)]
+        values = {name.removeprefix(_VALUE): kept[name] for name in names}
         if any(array.dtype.kind not in "iuf" for array in values.values()):
             raise ValueError
         failure, warnings = str(kept["failure"]), str(kept["warnings"])

@@ -53,10 +53,8 @@ def samples(varied: Sequence[Varied], count: int, method: str, seed: int) -> lis
     _check_count(count * (d + 2) if method == SALTELLI else count)
     share = _shares(d, count, method, seed)
     still = np.zeros(len(share))
-    columns = [
-        one.at(share[:, free.index(one.key)] if one.key in free else still) for one in varied
-    ]
-    return list(zip(*columns, strict=True))
+    values = [one.at(share[:, free.index(one.key)] if one.key in free else still) for one in varied]
+    return list(zip(*values, strict=True))
 
 
 def _shares(d: int, count: int, method: str, seed: int) -> NDArray[np.float64]:

@@ -54,12 +54,11 @@ class Backdrop:
 
     def about(self) -> dict[str, Any]:
         """Data for the page."""
+        shown = sorted(self.pictures.items())
         return {
             "size": list(self.size),
             "matrix": np.asarray(self.matrix, float).tolist(),
-            "pictures": [
-                [float(moment), _uri(content)] for moment, content in sorted(self.pictures.items())
-            ],
+            "pictures": [[float(moment), _uri(content)] for moment, content in shown],
         }
 
 

@@ -34,14 +34,12 @@ def orbits(arrays: Arrays, key: str, result: xr.Dataset) -> dict[str, Any]:
     size = np.array([largest(one) for one in amplitudes])
     own: Any = amplitudes / np.where(size > 0.0, size, 1.0)[:, None, None, None]
     series = Fourier(own.shape[1] - 1).real_of(own.swapaxes(0, 1)).swapaxes(0, 1)
-    count = len(chosen)
+    shapes, count = series.reshape(-1, *series.shape[2:]), len(chosen)
     return {
         "x": arrays.exact(f"{key}.x", some[along(result)].values, "f4"),
         "y": arrays.exact(f"{key}.y", some["amplitude"].values, "f4"),
         "sizes": arrays.exact(f"{key}.sizes", size, "f4"),
-        "displacement": arrays.changing(
-            f"{key}.u", series.reshape(-1, *series.shape[2:]), OF_MOTIONS
-        ),
+        "displacement": arrays.changing(f"{key}.u", shapes, OF_MOTIONS),
         "stable": _listed(some, "stable", [None] * count),
         "bifurcations": _listed(some, "bifurcation", [""] * count),
         "branches": _listed(some, "branch", [0] * count),

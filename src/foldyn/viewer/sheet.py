@@ -99,9 +99,8 @@ def catches(case: Case) -> list[list[int]]:
     """Vertices at the ends of creases with end stops or latches."""
     some = (one for one in case.supports if isinstance(one, Stop | Latch))
     chosen = [resolve_creases(case.structure, one.creases) for one in some]
-    return (
-        case.structure.pattern.creases[np.unique(np.concatenate(chosen))].tolist() if chosen else []
-    )
+    creases = case.structure.pattern.creases
+    return creases[np.unique(np.concatenate(chosen))].tolist() if chosen else []
 
 
 def load_arrows(case: Case) -> list[list[Any]]:

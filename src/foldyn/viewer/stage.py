@@ -262,11 +262,9 @@ def _more(
     first = next(iter(results.values()))
     usual = "coefficient" if kind == "periodic" else "displacement"
     name = quantity_of(first) if kind == "response" else usual
-    moved = [
-        np.abs(result[name].sel(node=nodes[:1] or [0]).transpose(..., "axis").values)
-        for result in results.values()
-    ]
-    largest = np.max([each.reshape(-1, 3).max(axis=0) for each in moved], axis=0)
+    shown = nodes[:1] or [0]
+    moved = [one[name].sel(node=shown).transpose(..., "axis").values for one in results.values()]
+    largest = np.max([np.abs(each).reshape(-1, 3).max(axis=0) for each in moved], axis=0)
     more = about_orbits(first) if kind == "periodic" else {}
     return {"axis": int(largest.argmax()), "unit": first[name].attrs.get("units", ""), **more}
 
@@ -277,9 +275,8 @@ def _likeness(results: Results, cases: Mapping[str, Case]) -> list[list[float | 
     if len(counts) > 1:
         return None
     (count,) = counts
-    every = np.concatenate(
-        [r["shape"].transpose("mode", "node", "axis").values[:, :count] for r in results.values()]
-    )
+    shapes = [one["shape"].transpose("mode", "node", "axis").values for one in results.values()]
+    every = np.concatenate([each[:, :count] for each in shapes])
     rows = mac(every, every).round(3).tolist()
     return [[value if np.isfinite(value) else None for value in row] for row in rows]
 

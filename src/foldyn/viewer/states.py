@@ -79,10 +79,8 @@ def states(case: Case, result: xr.Dataset, displacement: NDArray) -> States:
     plates, (stress, free, curl) = np.zeros((samples, 0)), _warm(acting, samples)
     # also for a shell with rigid panels
     if len(body.hidden) or not isinstance(structure, Structure):
-        parts = (
-            (part, k) for k, (load, _) in enumerate(acting) for part, _ in load.following_terms
-        )
-        pushes, factors = joined(parts), np.reshape([f for _, f in acting], (-1, samples))
+        each = ((part, k) for k, (load, _) in enumerate(acting) for part, _ in load.following_terms)
+        pushes, factors = joined(each), np.reshape([f for _, f in acting], (-1, samples))
         hidden, none = np.zeros(len(body.hidden)), sparse.csr_array((0, len(body.hidden)))
         found, kept = [], []
         for k, u in enumerate(displacement):
@@ -131,9 +129,8 @@ def _warm(acting: Sequence[tuple[SomeLoads, NDArray]], samples: int) -> list[NDA
 def hinge_angles(structure: Discretized, hinges: NDArray, displacement: NDArray) -> NDArray:
     """Dihedrals (samples, k) of hinges (k, 4), rad."""
     rows = hinges.astype(np.uint32)
-    return np.array([angles(structure.nodes + u, rows) for u in displacement]).reshape(
-        len(displacement), len(rows)
-    )
+    found = [angles(structure.nodes + u, rows) for u in displacement]
+    return np.reshape(found, (len(displacement), len(rows)))
 
 
 def bar_strain(structure: Discretized, displacement: NDArray) -> NDArray:

@@ -89,10 +89,8 @@ def smooth(shapes: NDArray) -> NDArray:
 
 def maps(result: xr.Dataset) -> NDArray[np.float64]:
     """Affine maps (state, period, 3, 4) from a cell to the next: rotation and translation, m."""
-    shift, axis, point = (
-        result[name].transpose("state", "period", "axis").values
-        for name in ("vectors", "axes", "points")
-    )
+    screw = (result[name] for name in ("vectors", "axes", "points"))
+    shift, axis, point = (one.transpose("state", "period", "axis").values for one in screw)
     turn = np.degrees(result["angles"].transpose("state", "period").values)
     out = np.zeros((*turn.shape, 3, 4))
     for at in np.ndindex(turn.shape):
@@ -132,9 +130,8 @@ def about_waves(result: xr.Dataset, triangles: int) -> dict[str, Any]:
     }  # fmt: skip
     if "state" in result.dims:
         own = result["state"].attrs
-        unit = {"degrees": "°"}.get(
-            own.get("units", ""), f" {own['units']}" if "units" in own else ""
-        )
+        word = f" {own['units']}" if "units" in own else ""
+        unit = "°" if word == " degrees" else word
         about |= {
             "states": result["state"].values.tolist(), "varied": own["long_name"], "unit": unit,
         }  # fmt: skip

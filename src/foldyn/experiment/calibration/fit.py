@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -44,11 +44,6 @@ class Point(NamedTuple):
     values: tuple[float, ...]
     runs: tuple[int, ...] | None = None
     second: bool = False
-
-
-def stamp(digest: str, point: Point) -> list[Any]:
-    """Everything that an evaluation depends on."""
-    return [digest, *point]
 
 
 def evaluate(problem: Problem, point: Point) -> Evaluation:
@@ -246,10 +241,10 @@ class _Search:
         self.run = np.repeat([runs[i] for i in range(len(observed))], [len(o) for o in observed])
 
     def _evaluations(self, made: Problem, pool: Pool) -> Evaluations[Point]:
-        self.all.append(
-            Evaluations[Point](pool, partial(stamp, made.digest()), self.folder, self._tell)
-        )
-        return self.all[-1]
+        digest = made.digest()
+        new = Evaluations[Point](pool, lambda point: [digest, *point], self.folder, self._tell)
+        self.all.append(new)
+        return new
 
     @property
     def count(self) -> int:
@@ -315,9 +310,9 @@ class _Search:
             change = ((fine - coarse) * self.weight)[self.chosen]
             shift = known.influence @ change / (1.0 - 0.5**finer.order)
             large = np.abs(shift) > known.standard_error
-            doubt = (
-                self._doubt(finer, values, shift, known) if large.any() else np.zeros(len(large))
-            )
+            doubt = np.zeros(len(large))
+            if large.any():
+                doubt = self._doubt(finer, values, shift, known)
             doubt[~(doubt > known.standard_error)] = 0.0
             for k in np.flatnonzero(large):
                 _warn(
@@ -419,9 +414,8 @@ class _Search:
 def _width(finer: Finer, doubt: float) -> str:
     """Describe how far the interval of a coarse model can be trusted."""
     if not doubt:
-        where = (
-            "" if finer.proof is not finer.problem else f", if its error has order {finer.order}"
-        )
+        proven = finer.proof is not finer.problem
+        where = "" if proven else f", if its error has order {finer.order}"
         return f"The interval is wide enough for both{where}"
     return (
         f"A finer {finer.what} disagrees with that by {doubt:.2g}: the interval is wider by "

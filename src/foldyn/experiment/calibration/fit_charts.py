@@ -8,15 +8,9 @@ from numpy.typing import NDArray
 
 from foldyn.cases import Case
 from foldyn.cases.directions import AXES
+from foldyn.experiment.calibration import measured
 from foldyn.experiment.calibration.histories import Spectrum, TimeHistory
-from foldyn.experiment.calibration.measured import (
-    MOST,
-    ForceDisplacement,
-    Measured,
-    Shapes,
-    dense_curve,
-    picture_plane,
-)
+from foldyn.experiment.calibration.measured import MOST, Shapes, dense_curve, picture_plane
 from foldyn.experiment.calibration.measurement import Measurement
 from foldyn.experiment.calibration.modal import FrequencyResponse, ModeShapes
 from foldyn.plots.charts import Chart, Curve
@@ -26,12 +20,12 @@ FLOOR = 1e-300  # magnitude that represents zero in decibels
 
 def charts_of(one: Measurement, result: xr.Dataset, case: Case) -> list[Chart]:
     """Charts of a measurement and the fitted model's result; empty if there is nothing to show."""
-    if isinstance(one, ForceDisplacement):
+    if isinstance(one, measured.ForceDisplacement):
         curve = dense_curve(one)
         model = Curve("model", curve.displacement, curve.predicted(result, case))
         seen = Curve(one.label, one.displacement, one.force, True, one.sigma)
         return [Chart(f"{one.axis} displacement (m)", f"{one.axis} force (N)", [model, seen])]
-    if isinstance(one, Measured):
+    if isinstance(one, measured.Measured):
         model = Curve("model", one.load_factor, one.predicted(result, case))
         seen = Curve(one.label, one.load_factor, one.values, True, one.sigma)
         label = f"{one.measure} ({one.unit})" if one.unit else one.measure

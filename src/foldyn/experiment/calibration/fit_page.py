@@ -124,9 +124,8 @@ def _provenance(fit: Fit, runs: Sequence[_Run], call: Call) -> list[Section]:
         if len(runs) > 1:
             sections.append(Heading(run.name, level=3))
         case = run.case_file.case()
-        sections.append(
-            inputs_table(inputs(run.case_file, case, {run.case_file.masses[0]: run.result}))
-        )
+        found = {run.case_file.masses[0]: run.result}
+        sections.append(inputs_table(inputs(run.case_file, case, found)))
     sections.append(inputs_table(computed({run.name: run.result for run in runs}, call)))
     for path in dict.fromkeys([fit.problem.path, *(run.case_file.path for run in runs)]):
         sections.append(Listing(f"The case file {path.name}", path.read_text("utf-8")))

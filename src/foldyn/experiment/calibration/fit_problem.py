@@ -108,9 +108,8 @@ class Problem:
         """Predictions of a run at given values."""
         case_file, members = self.case_file(run, values), run.those_of(self.measurements)
         with quietly():
-            return self._predicted(
-                predicted_run.seen(run, case_file, members), case_file, run.members
-            )
+            result = predicted_run.seen(run, case_file, members)
+            return self._predicted(result, case_file, run.members)
 
     def _predicted(
         self, result: xr.Dataset, case_file: CaseFile, members: Sequence[int]
@@ -158,9 +157,8 @@ class Problem:
         like : case file at other values, whose structure is reused if it is the same.
         """
         changes = self.space.changes(values)
-        fixed = HINGES not in run.document["pattern"] and not any(
-            key.startswith("pattern") for key in changes
-        )
+        of_pattern = [key for key in changes if key.startswith("pattern")]
+        fixed = HINGES not in run.document["pattern"] and not of_pattern
         pattern = run.patterns[0] if fixed and run.patterns else None
         structures = None
         if like is not None:

@@ -425,6 +425,5 @@ def score(one: Measurement, predicted: NDArray) -> Score:
     misfit = predicted - observed
     rms = float(np.sqrt(np.mean(misfit**2)))
     sigmas = np.nan if one.sigma is None else float(np.sqrt(np.mean((misfit / one.errors()) ** 2)))
-    return Score(
-        one.name, one.held_out, len(observed), rms, one.unit, rms / spread(observed), sigmas
-    )
+    relative = rms / spread(observed)
+    return Score(one.name, one.held_out, len(observed), rms, one.unit, relative, sigmas)

@@ -229,13 +229,9 @@ def _columns(
         raise InputError(f"{file}: quantity = {show(quantity)}: the columns have a {named}")
     parts += ("sigma",) if "sigma" in there else ()
     base = UNITS_OF[named][0]
-    fields = {
-        f"{node} {part}": (f"node {node} {axis} {part}", base) for node in nodes for part in parts
-    }
+    fields = {f"{n} {p}": (f"node {n} {axis} {p}", base) for n in nodes for p in parts}
     table = read_numbers(file, {"frequency": ("frequency", "Hz"), **fields}, gaps=[*fields])
-    columns = {
-        part: np.stack([table[f"{node} {part}"] for node in nodes], axis=1) for part in parts
-    }
+    columns = {p: np.stack([table[f"{n} {p}"] for n in nodes], axis=1) for p in parts}
     values = (
         columns["magnitude"] if "magnitude" in parts else columns["real"] + 1j * columns["imag"]
     )

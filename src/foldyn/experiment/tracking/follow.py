@@ -369,6 +369,5 @@ def _only(these: NDArray[np.bool_], places: Array) -> Array:
 
 def _repeats(frame: NDArray[np.uint8], last: NDArray[np.uint8]) -> bool:
     """Whether a frame is the same picture as the last one."""
-    if (frame[::16, ::16] != last[::16, ::16]).any():
-        return False
-    return bool((frame == last).all())
+    some = np.s_[::16, ::16]  # mostly enough to see that they differ
+    return bool((frame[some] == last[some]).all() and (frame == last).all())

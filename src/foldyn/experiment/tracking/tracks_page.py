@@ -92,9 +92,8 @@ def spread(count: int, encoded: Callable[[int], bytes]) -> dict[int, bytes]:
 def most_moved(tracks: xr.Dataset) -> list[int]:
     """Nodes that move most among the nodes that were measured most of the time."""
     moved = tracks["displacement"].values
-    known = np.isfinite(moved)
-    high = np.where(known, moved, -np.inf).max(axis=0)
-    low = np.where(known, moved, np.inf).min(axis=0)
+    high = np.nanmax(moved, axis=0, initial=-np.inf)
+    low = np.nanmin(moved, axis=0, initial=np.inf)
     span = np.where(np.isfinite(high - low), high - low, 0.0).max(axis=1)
     span[tracks["tracked"].values < SEEN * tracks["tracked"].values.max()] = -1.0
     return sorted(int(node) for node in np.argsort(-span)[:MOST])

@@ -139,9 +139,8 @@ def released_case(
 
 def fit_folds(static: Sequence[experiment.Measurement], **options: Any) -> experiment.Fit:
     """Fit the length-scale ratio and theta1 = 360 - theta2 to a static test."""
-    return experiment.fit(
-        find_case("herkal/specimen"), static, parameters=FOLD_RANGES, ties=MIRRORED, **options
-    )
+    case = find_case("herkal/specimen")
+    return experiment.fit(case, static, parameters=FOLD_RANGES, ties=MIRRORED, **options)
 
 
 def changes_of(folds: experiment.Fit) -> dict[str, Any]:

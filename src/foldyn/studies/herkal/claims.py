@@ -29,9 +29,8 @@ def _edge(motion: xarray.Dataset) -> NDArray:
 def _asymmetry(study: Study, models: Iterable[str]) -> float:
     """Largest difference between the motions of the two nodes of case 1, among some models."""
     moved = [_edge(study.motions("case1")[model]) for model in models]
-    return max(
-        float(np.linalg.norm(x[:, 0] - x[:, 1]) / np.linalg.norm(x.mean(axis=1))) for x in moved
-    )
+    ratios = [np.linalg.norm(x[:, 0] - x[:, 1]) / np.linalg.norm(x.mean(axis=1)) for x in moved]
+    return float(max(ratios))
 
 
 def second_peak_case1(study: Study) -> float:

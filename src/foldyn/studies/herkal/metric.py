@@ -112,9 +112,8 @@ def errors(
 
     The paper's metric is the mean of these deviations.
     """
-    return deviation(
-        content(motion, nodes, axis, up_to)[1], content(reference, nodes, axis, up_to)[1]
-    )
+    ours, theirs = (content(one, nodes, axis, up_to)[1] for one in (motion, reference))
+    return deviation(ours, theirs)
 
 
 def ranks(values: Mapping[str, float]) -> dict[str, int]:

@@ -274,14 +274,12 @@ def _vibrations(front: xr.Dataset, data: Data) -> list[Section]:
     curves = {f"{data.label}, as filmed": at["whole"]}
     if "true" in front:
         curves[f"{data.label}, its true motion"] = at["true"]
-    curves |= {
-        f"model: {name}": at["model"].sel(support=key) for key, name in SUPPORT_NAMES.items()
-    }
+    for key, name in SUPPORT_NAMES.items():
+        curves[f"model: {name}"] = at["model"].sel(support=key)
     found = {name: evaluation.vibration_of(x.values, step) for name, x in curves.items()}
     paper = read_targets("specimen")
-    rows: list[list[Any]] = [
-        ["paper", paper["release_frequency"].value, None, paper["release_damping"].value]
-    ]
+    frequency, damping = (paper[f"release_{name}"].value for name in ("frequency", "damping"))
+    rows: list[list[Any]] = [["paper", frequency, None, damping]]
     for name, one in found.items():
         rows.append([name, *map(cell, (one.peak, one.frequency, 100.0 * one.damping_ratio))])
     table = Table(
@@ -293,7 +291,7 @@ def _vibrations(front: xr.Dataset, data: Data) -> list[Section]:
         digits=3,
     )
     held, alone = (found[f"model: {SUPPORT_NAMES[key]}"].peak for key in (FILM_SUPPORT, ALONE))
-    return [table, *_tracked(front), Text(_glue(held, alone, paper["release_frequency"].value))]
+    return [table, *_tracked(front), Text(_glue(held, alone, frequency))]
 
 
 def _tracked(front: xr.Dataset) -> list[Section]:
@@ -354,6 +352,7 @@ def _vibration(folder: Path, album: Album, note: str) -> list[Section]:
         "published": "the paper's parameters", "air": "the same in air",
         "fitted": "fitted parameters",
     }  # fmt: skip
+    labeled = {labels[name]: one for name, one in responses.items()}
     paper = read_targets("specimen")
     peaks = [paper[f"frf_{which}_peak"].value for which in ORDINALS]
     modes = load(folder / tasks.MODES)
@@ -364,9 +363,7 @@ def _vibration(folder: Path, album: Album, note: str) -> list[Section]:
         *album.figure(
             "specimen-response",
             "Response of a corner of the top to a sine of 1 mN on each of its nodes.",
-            lambda: plot_responses(
-                {labels[name]: one for name, one in responses.items()}, peaks, note
-            ),
+            lambda: plot_responses(labeled, peaks, note),
         ),
         _response_table(responses, paper),
         *album.figure(
