@@ -63,6 +63,7 @@ def rod(law: Any, **given: Any) -> fd.Case:
 @pytest.mark.parametrize("stretch", [0.7, 0.97, 1.0, 1.0 + 1e-6, 1.4])
 def test_tension_energy_and_stiffness_are_those_of_the_law(name, stretch):
     case, (pull, slope, stored) = rod(LAWS[name]), CLOSED[name]
+    assert case.lines is not None
     u = np.array([0, 0, 0, OWN * (stretch - 1.0), *5 * [0]])
     assert case.lines.pulls(u) == pytest.approx([EA * pull(stretch)], rel=1e-12, abs=1e-12 * EA)
     assert case.body.energies(u)[-1] == pytest.approx(
@@ -159,7 +160,9 @@ def test_vibrations_of_a_point_between_stretched_bars():
     pull, slope, _ = CLOSED["ogden"]
     s = points([[-1, 0, 0], [0, 0, 0], [1, 0, 0]])
     bars = fd.Bar([(0, 1), (1, 2)], EA, rest_length=OWN, law="ogden")
-    found = fd.modes(fd.Case(s, [fd.Fix([0, 2]), bars]), 3, state=fd.State(0 * s.nodes), check_model=False)
+    found = fd.modes(
+        fd.Case(s, [fd.Fix([0, 2]), bars]), 3, state=fd.State(0 * s.nodes), check_model=False
+    )
     across, along = 2.0 * EA * pull(1 / OWN), 2.0 * EA / OWN * slope(1 / OWN)
     expected = np.sqrt([across, across, along]) / (2.0 * math.pi)
     assert found.frequency.values == pytest.approx(expected, rel=1e-10)
@@ -176,7 +179,7 @@ loads = [{ nodes = [8], force = [0.0, 0.0, 1e-4] }]
 """
 
 
-def of_file(folder: Any, bar: str) -> fd.Bar:
+def of_file(folder: Any, bar: str) -> Any:
     file = folder / "case.toml"
     file.write_text(FILE.replace("BAR", bar))
     return fd.read_case(file).case().supports[1]
@@ -203,14 +206,17 @@ def test_laws_come_back_from_results(tmp_path):
 
 
 WRONG: dict[str, tuple[dict[str, Any], str]] = {
-    "nothing": ({}, r"stiffness: give either stiffness, which is EA \(N\), or both area"),
-    "half": ({"area": 1e-6}, r"area = 1e-06: give either stiffness"),
-    "the other half": ({"modulus": 1e9}, r"modulus = 1e\+09: give either stiffness"),
-    "all": ({"stiffness": 1.0, "area": 1e-6, "modulus": 1e6}, r"modulus = 1e\+06: give either"),
-    "one too many": ({"stiffness": 1.0, "area": 1e-6}, r"area = 1e-06: give either stiffness"),
+    "nothing": ({}, r"stiffness: give either EA \(N\), or both area \(m2\) and modulus \(Pa\)"),
+    "half": ({"area": 1e-6}, r"area: give either EA"),
+    "the other half": ({"modulus": 1e9}, r"modulus: give either EA"),
+    "all": ({"stiffness": 1.0, "area": 1e-6, "modulus": 1e6}, r"modulus: give either EA"),
+    "one too many": ({"stiffness": 1.0, "area": 1e-6}, r"area: give either EA"),
     "no area": ({"area": 0.0, "modulus": 1e9}, r"area = 0.0: must be greater than 0 m2"),
     "a wrong law": ({"stiffness": 1.0, "law": "hooke"}, r"law = 'hooke': choose one of ogden, lin"),
-    "a hinge's law": ({"stiffness": 1.0, "law": fd.materials.Superlinear()}, "law = .*give a BarLaw object"),
+    "a hinge's law": (
+        {"stiffness": 1.0, "law": fd.materials.Superlinear()},
+        "law = .*give a BarLaw object",
+    ),
 }
 
 
@@ -223,7 +229,7 @@ def test_what_bars_refuse(name):
 
 def test_messages_of_files_name_the_keys(tmp_path):
     for text, message in (
-        ("bar_area = 1e-6", r"supports\[1\].bar_area = 1e-06: give either"),
+        ("bar_area = 1e-6", r"supports\[1\].bar_area: give either"),
         ("bar_mass = 1.0", r"supports\[1\].bar_stiffness: give either"),
         ('bar_stiffness = 1.0, bar_law = "hooke"', r"supports\[1\].bar_law = .*hooke"),
     ):

@@ -147,8 +147,7 @@ ARRAYS = {  # that count, with a star where forces are linear, with a minus wher
     "springs": "direction *stiffness lines.vector lines.length *lines.stretch *lines.stiffness",
     "springs without length": "*lines.vector *lines.stiffness -lines.length -lines.stretch",
     "cables": "lines.vector lines.length *lines.stretch *lines.stiffness",
-    "bars with laws":
-        "lines.vector lines.length lines.stretch lines.natural *lines.stiffness",
+    "bars with laws": "lines.vector lines.length lines.stretch lines.natural *lines.stiffness",
     "clamps": "bars.rest wings *bend_rest *stiffness",
     "dashpots": "axial corners *coefficient -hidden_turn",
     "damped sides": "corners hidden_turn *coefficient",

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Annotated, Any
 
 import numpy as np
@@ -25,6 +26,7 @@ from foldyn.structures.discretized import Discretized
 from foldyn.values import indices, number, show, single, vector
 
 SLACK = 1.001  # a cable that is this many times as long as its line at rest is said to be slack
+above = partial(Check, number, above=0.0)
 STEADY_NOW = (0.0, 0.0, 1.0, 0.0)  # see `Lines.now`
 
 
@@ -240,21 +242,15 @@ class Bar(Elastic):
     """
 
     between: Annotated[Pairs, Key("bar")]
-    stiffness: Annotated[
-        float | None, Check(number, above=0.0, unit="N"), Key("bar_stiffness")
-    ] = None
-    area: Annotated[float | None, Check(number, above=0.0, unit="m2"), Key("bar_area")] = None
-    modulus: Annotated[float | None, Check(number, above=0.0, unit="Pa"), Key("bar_modulus")] = None
+    stiffness: Annotated[float | None, above(unit="N"), Key("bar_stiffness")] = None
+    area: Annotated[float | None, above(unit="m2"), Key("bar_area")] = None
+    modulus: Annotated[float | None, above(unit="Pa"), Key("bar_modulus")] = None
     law: Annotated[
         str | BarLaw | None, Placed(bar_law, field=""), Key("bar_law"),
         Read(KindOf(law_from, BAR_LAWS, named=True, laws=BAR_LAWS)),
     ] = None  # fmt: skip
-    rest_length: Annotated[float | None, Check(number, above=0.0, unit="m"), Key("bar_length")] = (
-        None
-    )
-    bending: Annotated[float | None, Check(number, above=0.0, unit="N m2"), Key("bar_bending")] = (
-        None
-    )
+    rest_length: Annotated[float | None, above(unit="m"), Key("bar_length")] = None
+    bending: Annotated[float | None, above(unit="N m2"), Key("bar_bending")] = None
     mass: Annotated[float, Check(number, least=0.0, unit="kg"), Key("bar_mass")] = 0.0
     until: Until = None
 
@@ -265,13 +261,8 @@ class Bar(Elastic):
         """Require EA, or both of its factors."""
         given = self.given("stiffness", "area", "modulus")
         if given not in (["stiffness"], ["area", "modulus"]):
-            name = given[-1] if given else "stiffness"
-            value = f" = {getattr(self, name):g}" if given else ""
-            raise InputError(
-                f"{value}: give either stiffness, which is EA (N), or both area (m2) and modulus "
-                "(Pa) of the bars",
-                name,
-            )
+            name = (given or ["stiffness"])[-1]
+            raise InputError(": give either EA (N), or both area (m2) and modulus (Pa)", name)
 
     @property
     def axial_stiffness(self) -> float:
@@ -286,10 +277,8 @@ class Bar(Elastic):
             length = float(np.linalg.norm(x[1] - x[0]))
             _refuse_coincident(structure, x, list(map(int, pair)), f"{place}.between[{k}]")
             own = self.rest_length or length
-            limit = math.pi**2 * self.bending / length**2 if self.bending else math.inf
-            made.add_line(
-                pair, x, self.axial_stiffness, own, scaled=True, limit=limit, law=self.law
-            )
+            most = math.pi**2 * self.bending / length**2 if self.bending else math.inf
+            made.add_line(pair, x, self.axial_stiffness, own, scaled=True, limit=most, law=self.law)
 
 
 def _refuse_coincident(
@@ -360,17 +349,13 @@ class Cable(Elastic):
     """
 
     nodes: Annotated[Sequence[Any], Check(_points), Key("cable")]
-    stiffness: Annotated[float, Check(number, above=0.0, unit="N"), Key("cable_stiffness")]
-    rest_length: Annotated[
-        float | None, Check(number, above=0.0, unit="m"), Key("cable_length")
-    ] = None
+    stiffness: Annotated[float, above(unit="N"), Key("cable_stiffness")]
+    rest_length: Annotated[float | None, above(unit="m"), Key("cable_length")] = None
     pretension: Annotated[float | None, Check(number, least=0.0, unit="N")] = None
     change: Annotated[float, Check(number, unit="m"), Key("cable_change")] = 0.0
     history: Factor = STEADY
     friction: Annotated[float, Check(number, least=0.0), Key("cable_friction")] = 0.0
-    sliding_speed: Annotated[
-        float, Check(number, above=0.0, unit="m/s"), Key("cable_sliding_speed")
-    ] = 1e-3
+    sliding_speed: Annotated[float, above(unit="m/s"), Key("cable_sliding_speed")] = 1e-3
     until: Until = None
 
     missing = {"cable_stiffness": "give EA (N) of the cable"}

@@ -99,35 +99,20 @@ def strength(lines, s, ahead):
 
 
 @inner_scalar
-def pulled(lines, s, beyond):
-    """Tension of a line per k, m, at the extension `beyond`, m."""
-    code, natural = lines.code[s], lines.natural[s]
-    if code == NO_LAW:
-        return beyond
-    return (natural + beyond) * bar_stress(code, beyond / natural, lines.addresses[s, 1])
-
-
-@inner_scalar
-def stored(lines, s, beyond):
-    """Energy of a line per k, m^2, at the extension `beyond`, m."""
-    code, natural = lines.code[s], lines.natural[s]
-    if code == NO_LAW:
-        return 0.5 * beyond * beyond
-    return natural * natural * bar_energy(code, beyond / natural, lines.addresses[s, 0])
-
-
-@inner_scalar
-def stiffened(lines, s, beyond):
-    """Derivative of `pulled` by the extension."""
+def response(lines, s, beyond):
+    """Energy (m2), tension (m) and its slope of a line per k, at the extension `beyond`, m."""
     if lines.code[s] == NO_LAW:
-        return 1.0
-    code, e, address = lines.code[s], beyond / lines.natural[s], lines.addresses[s]
-    return bar_stress(code, e, address[1]) + (1.0 + e) ** 2 * bar_slope(code, e, address[2])
+        return 0.5 * beyond * beyond, beyond, 1.0
+    code, natural, address = lines.code[s], lines.natural[s], lines.addresses[s]
+    e = beyond / natural
+    stress = bar_stress(code, e, address[1])
+    slope = stress + (1.0 + e) ** 2 * bar_slope(code, e, address[2])
+    return natural**2 * bar_energy(code, e, address[0]), (natural + beyond) * stress, slope
 
 
 @inner_scalar
-def pulled_between(lines, s, first, last):
-    """Mean of `pulled` whose work between two extensions (m) is the change of `stored`."""
+def mean_pull(lines, s, first, last):
+    """Mean tension per k, m, whose work between two extensions (m) is the change of energy."""
     if lines.code[s] == NO_LAW:
         return 0.5 * (first + last)
     natural = lines.natural[s]
@@ -177,10 +162,9 @@ def pull_lines(lines, u, force):
         beyond = extension(lines, u, s, 0.0)
         if idle(lines, s, beyond):
             continue
-        k = strength(lines, s, 0.0)
-        tension = k * pulled(lines, s, beyond)
+        k, reach = strength(lines, s, 0.0), response(lines, s, beyond)[1]
         for i in range(lines.first[s], lines.first[s + 1] - 1):
-            pull = per_length(lines, s, tension, piece(lines, u, i)[1])
+            pull = per_length(lines, s, k * reach, piece(lines, u, i)[1])
             add_pull(lines, i, pull, u, u, force)
         if lines.row[s, 0] >= 0 or lines.row[s, 1] >= 0:
             power += 0.5 * beyond * beyond * _rate_of_strength(lines, s, k)
@@ -202,7 +186,7 @@ def _rate_of_strength(lines, s, k):
 def put_tensions(lines, u, out):
     """Put the tensions (c,) of all lines, N, to `out`; those of slack ones as if they pushed."""
     for s in range(lines.stiffness.size):
-        out[s] = strength(lines, s, 0.0) * pulled(lines, s, extension(lines, u, s, 0.0))
+        out[s] = strength(lines, s, 0.0) * response(lines, s, extension(lines, u, s, 0.0))[1]
 
 
 @inner
@@ -210,15 +194,15 @@ def lines_energy(lines, u):
     """Energy of all lines, J."""
     energy = 0.0
     for s in range(lines.stiffness.size):
-        energy += strength(lines, s, 0.0) * _filled(lines, u, s, 0.0)[1]
+        energy += strength(lines, s, 0.0) * _stored(lines, u, s, 0.0)[1]
     return energy
 
 
 @inner_scalar
-def _filled(lines, u, s, ahead):
+def _stored(lines, u, s, ahead):
     """Extension of a line, and the energy per stiffness."""
     beyond = extension(lines, u, s, ahead)
-    return beyond, 0.0 if idle(lines, s, beyond) else stored(lines, s, beyond)
+    return beyond, 0.0 if idle(lines, s, beyond) else response(lines, s, beyond)[0]
 
 
 @inner
@@ -229,12 +213,12 @@ def pull_on_average(lines, u0, u1, h, force):
     """
     power = 0.0
     for s in range(lines.stiffness.size):
-        first, before = _filled(lines, u0, s, -0.5 * h)
-        last, after = _filled(lines, u1, s, 0.5 * h)
+        first, before = _stored(lines, u0, s, -0.5 * h)
+        last, after = _stored(lines, u1, s, 0.5 * h)
         if before == 0.0 and after == 0.0:
             continue
         soft, stiff = strength(lines, s, -0.5 * h), strength(lines, s, 0.5 * h)
-        mean = pulled_between(lines, s, first, last)
+        mean = mean_pull(lines, s, first, last)
         if lines.slack[s] and (first < 0.0 or last < 0.0):
             mean = (after - before) / (last - first)
         tension = 0.5 * (soft + stiff) * mean
@@ -277,16 +261,16 @@ def line_blocks(lines, u, loose, out):
         beyond, k = extension(lines, u, s, 0.0), strength(lines, s, 0.0)
         if lines.slack[s] and beyond < -JUST_TAUT * (lines.natural[s] + lines.now[s, 0]):
             continue
-        tension, slope = k * pulled(lines, s, beyond), k * stiffened(lines, s, beyond)
+        _, reach, slope = response(lines, s, beyond)
         rates = room[:points]
         line_rates(lines, u, s, rates)
         for a in range(size):
             for b in range(size):
-                block[a, b] = slope * rates[a // 3, a % 3] * rates[b // 3, b % 3]
+                block[a, b] = k * slope * rates[a // 3, a % 3] * rates[b // 3, b % 3]
         for j in range(0 if loose and beyond < 0.0 else points - 1):
             i = lines.first[s] + j
             length = piece(lines, u, i)[1]
-            pull = per_length(lines, s, tension, length)
+            pull = per_length(lines, s, k * reach, length)
             for a in range(3):
                 for b in range(3):
                     product = along(lines, u, i, a) * along(lines, u, i, b)
@@ -307,18 +291,18 @@ def differentiate_lines(lines, out, u, weights, added):
         k, growth = strength(lines, s, 0.0), 0.0  # growth: rate of l for velocities `weights`
         for i in range(lines.first[s], lines.first[s + 1] - 1):
             growth += growth_of(lines, u, weights, i)[0]
-        reach, slope = pulled(lines, s, beyond), k * stiffened(lines, s, beyond)
-        out.stretch[s] += slope * growth
+        _, reach, slope = response(lines, s, beyond)
+        out.stretch[s] += k * slope * growth
         out.stiffness[s] += reach * growth
         if lines.code[s] != NO_LAW:
-            out.natural[s] += (k * reach - slope * beyond) / lines.natural[s] * growth
+            out.natural[s] += k * (reach - slope * beyond) / lines.natural[s] * growth
         for i in range(lines.first[s], lines.first[s + 1] - 1):
             own, length = growth_of(lines, u, weights, i)
             pull = per_length(lines, s, k * reach, length)
             by_length = 0.0  # derivative by the length of the piece
             if length > 0.0:
-                by_length = 0.0 if free(lines, s) else slope * growth - pull * own
-                out.length[i] += by_length * lines.length[i] / length - slope * growth
+                by_length = 0.0 if free(lines, s) else k * slope * growth - pull * own
+                out.length[i] += by_length * lines.length[i] / length - k * slope * growth
                 by_length /= length
             for c in range(3):
                 by = pull * between(lines, weights, i, c)

@@ -24,7 +24,7 @@ directed_extension = ported(springs.directed_extension)
 piece, extension = ported(lines.piece), ported(lines.extension)
 along = ported(lines.along)
 strength, idle, per_length = ported(lines.strength), ported(lines.idle), ported(lines.per_length)
-pulled, stored = ported(lines.pulled), ported(lines.stored)
+response = ported(lines.response)
 
 
 class Counts(NamedTuple):
@@ -199,9 +199,9 @@ def springs_to(all_springs, m, group, u, slot, size, at_slot, who, crowd, sample
         beyond, stiff = extension(line, u, s, 0.0), strength(line, s, 0.0)
         if idle(line, s, beyond):
             beyond = 0.0
-        tension = stiff * pulled(line, s, beyond)
+        stored, reach, _ = response(line, s, beyond)
         for i in range(line.first[s], line.first[s + 1] - 1):
-            pull = per_length(line, s, tension, piece(line, u, i)[1])
+            pull = per_length(line, s, stiff * reach, piece(line, u, i)[1])
             put(
                 slot, size, at_slot + directed + i - s,  # a line has a piece less than points
                 pull * along(line, u, i, 0),
@@ -209,7 +209,7 @@ def springs_to(all_springs, m, group, u, slot, size, at_slot, who, crowd, sample
                 pull * along(line, u, i, 2),
             )  # fmt: skip
         if sampled:
-            strain[group] += stiff * stored(line, s, beyond)
+            strain[group] += stiff * stored
     return at_slot + directed + line.node.shape[0] - count
 
 
