@@ -235,3 +235,13 @@ def test_messages_of_files_name_the_keys(tmp_path):
     ):
         with pytest.raises(InputError, match=message):
             of_file(tmp_path, text)
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_pressed_bars_stay_pressed_beside_cables_that_count_as_taut(law):
+    s = structure("bars and hinges", FOLD)
+    bar = fd.Bar((1, 3), 70.0, rest_length=1.8, law=LAWS[law])
+    lines = fd.Case(s, [fd.Cable([0, 3], 900.0, pretension=2.0), bar]).lines
+    assert lines is not None and lines.tensions(0 * moved(s, 1.0))[1] < 0.0
+    q = moved(s, 0.01)
+    np.testing.assert_allclose(lines.nominal(q).entries(q), lines.entries(q), rtol=1e-12, atol=1e-9)
