@@ -94,7 +94,8 @@ DATA: Calls = {
         "stiffness": 2.0, "between": [(0, 1)], "rest_length": 0.5,
     }),
     "Bar": (fd.Bar, {
-        "between": [(0, 1)], "stiffness": 2.0, "rest_length": 0.5, "bending": 0.25,
+        "between": [(0, 1)], "area": 0.5, "modulus": 2.0, "law": "ogden", "rest_length": 0.5,
+        "bending": 0.25,
         "mass": 0.5, "until": 0.5,
     }),
     "Cable": (fd.Cable, {

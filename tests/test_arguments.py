@@ -71,7 +71,7 @@ def test_every_public_name_and_parameter_has_a_call(calls):
     for name, (function, arguments) in calls.items():
         known = inspect.signature(function).parameters
         several = {"Sheet", "PanelSheet", "Fix", "Impose", "Actuate", "TotalForce", "Spring"}
-        several |= {"Dashpot", "Link", "Cable"}
+        several |= {"Dashpot", "Link", "Cable", "Bar"}
         missing = set(known) - set(arguments) - LEFT - {"history"}
         assert not missing or name in several, (name, missing)
 

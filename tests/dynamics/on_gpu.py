@@ -87,6 +87,8 @@ def shaken(of: fd.Case, seed: int = 0) -> fd.State:
 SPRINGS = [
     fd.Spring(3.0, nodes=[7, 8]), fd.Spring(7.0, nodes=[5], direction=(1, 2, -1)),
     fd.Spring(4.0, between=[(3, 7)]), fd.Spring(2.0, between=[(4, 8)], rest_length=0.4),
+    fd.Bar((3, 8), 0.5), fd.Bar((6, 8), 0.5, law="ogden", rest_length=0.9),
+    fd.Bar((5, 7), 0.5, law="linear", rest_length=0.9),
 ]  # fmt: skip
 DASHPOTS = [
     fd.Dashpot(0.01, nodes=[7]), fd.Dashpot(0.02, nodes=[8], direction="x"),

@@ -58,11 +58,15 @@ def sheet(**options) -> fd.Case:
 
 LUMPED = {"mass": "mixed_voronoi", "preset": "plate"}
 PLATES = lambda: sheet(preset="n5b8e", mass="mixed_voronoi")  # noqa: E731
+OWN = fd.CustomBarLaw(lambda s: 0.5 * (s - 1) ** 2, lambda s: (s - 1) / s, lambda s: 1 / s**3)
 REFUSED = {
     "the model Shell": lambda: fd.Case(fd.shell(PATTERN, SHEET, divisions=1), [HELD]),
     "not diagonal": lambda: sheet(preset="herkal", mass="consistent"),
     "the term ": lambda: fd.Case(
         fd.discretize(PATTERN, SHEET, **LUMPED), [HELD], contact=fd.Contact()
+    ),
+    "a bar with a law of your own": lambda: fd.Case(
+        fd.discretize(PATTERN, SHEET, **LUMPED), [HELD, fd.Bar((0, 8), 1.0, law=OWN)]
     ),
     "a support that moves": lambda: fd.Case(
         fd.discretize(PATTERN, SHEET, **LUMPED),

@@ -130,6 +130,8 @@ def _design(rng: Any, model: Any, kind: str) -> tuple[Callable[..., fd.Case], di
         del values["corner"]
     if moves:
         values["moved"] = rng.uniform(0.005, 0.02)
+    values |= {"bar": stiff * rng.uniform(0.1, 1.0), "cut": rng.uniform(0.9, 1.1)}
+    of_bar = [None, "ogden", "linear"][rng.integers(3)]
 
     def drawn_of(v: Mapping[str, Any]) -> fd.Pattern:
         if miura:
@@ -170,6 +172,9 @@ def _design(rng: Any, model: Any, kind: str) -> tuple[Callable[..., fd.Case], di
         if constraint == "plate":
             supports.append(fd.Link([7], to=[4, 5, 8]))
         supports.append(fd.Spring(v["spring"], beside, direction=(0.3, 0.2, 1.0)))
+        whole = float(np.linalg.norm(pattern.vertices[far] - pattern.vertices[0]))
+        bar = fd.Bar((0, far), area=v["bar"], modulus=1.0, rest_length=v["cut"] * whole, law=of_bar)
+        supports.append(bar)
         if "moved" in v:
             place = 6 if miura else 4
             supports.append(fd.Impose([place], "z", v["moved"], history))

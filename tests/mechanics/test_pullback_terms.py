@@ -99,6 +99,13 @@ TERMS: dict[str, Callable[[], Lone]] = {
         ),
         SpringsTerm,
     ),
+    "bars with laws": lambda: lone(
+        supported(
+            fd.Bar([(0, 3), (1, 2)], 70.0, rest_length=2.0, law="ogden"),
+            fd.Bar((1, 3), 70.0, rest_length=1.1, law="linear"),
+        ),
+        SpringsTerm,
+    ),
     "clamps": lambda: lone(supported(clamped=[(0, 1)]), ClampsTerm),
     "dashpots": lambda: lone(damped("herkal", fd.CreaseDamping(0.3), AXIAL), ViscousTerm),
     "damped sides": lambda: lone(damped("shell", fd.CreaseDamping(0.3)), ViscousTerm),
@@ -140,6 +147,7 @@ ARRAYS = {  # that count, with a star where forces are linear, with a minus wher
     "springs": "direction *stiffness lines.vector lines.length *lines.stretch *lines.stiffness",
     "springs without length": "*lines.vector *lines.stiffness -lines.length -lines.stretch",
     "cables": "lines.vector lines.length *lines.stretch *lines.stiffness",
+    "bars with laws": "lines.vector lines.length lines.stretch lines.natural *lines.stiffness",
     "clamps": "bars.rest wings *bend_rest *stiffness",
     "dashpots": "axial corners *coefficient -hidden_turn",
     "damped sides": "corners hidden_turn *coefficient",

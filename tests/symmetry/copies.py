@@ -292,7 +292,8 @@ FIELDS: Mapping[str, Callable[[Copy, Any], Any]] = {
     **dict.fromkeys(("length_scale_ratio", "fraction", "change", "expansion"), Copy.same),
     **dict.fromkeys(("stiffness", "rest_length", "coefficient", "alpha", "beta"), Copy.same),
     **dict.fromkeys(("bending", "pretension", "stiffness_history", "release"), Copy.same),
-    **dict.fromkeys(("until", "Stop.damping", "sliding_speed"), Copy.same),
+    **dict.fromkeys(("until", "Stop.damping", "sliding_speed", "Bar.area"), Copy.same),
+    **dict.fromkeys(("Bar.modulus", "Bar.law"), Copy.same),
     **dict.fromkeys(("ratios", "times", "onset", "yield_moment", "isotropic"), Copy.same),
     **dict.fromkeys(("kinematic", "barrier_moment", "rate", "friction"), Copy.same),
     **dict.fromkeys(("added_mass", "drag", "drag_coefficient", "resolution"), Copy.same),
@@ -319,7 +320,7 @@ def copied(case: fd.Case, symmetry: Symmetry) -> tuple[fd.Case, Copy]:
 # ------------------------------------------------------------------ halves
 HALVED = {
     "vector", "total", "force_per_length", "acceleration", "pressure", "moment", "change",
-    "mass", "Spring.stiffness", "Bar.stiffness", "Cable.stiffness", "Stop.stiffness",
+    "mass", "Spring.stiffness", "Bar.stiffness", "Bar.area", "Cable.stiffness", "Stop.stiffness",
     "Latch.stiffness", "coefficient", "BaseMotion.value",
 }  # fmt: skip
 """Fields in proportion to which a part acts; a part that has none of them is not split."""
@@ -339,7 +340,7 @@ def halves(part: Any) -> list[Any]:
     kind = type(part).__name__
     for item in fields(part):
         value = getattr(part, item.name)
-        if item.name in HALVED or f"{kind}.{item.name}" in HALVED:
+        if value is not None and {item.name, f"{kind}.{item.name}"} & HALVED:
             half = replace(part, **{item.name: (0.5 * np.array(value)).tolist()})
             for other in ("pretension", "release", "damping", "mass"):
                 if getattr(part, other, None) is not None:

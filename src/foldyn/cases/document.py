@@ -274,6 +274,8 @@ class _Writer:
 
     def _part(self, part: Any) -> dict[str, Any]:
         section = part.table()
+        if "bar_law" in section:
+            section["bar_law"] = self._law("bar_law", section["bar_law"])
         for name in filter(lambda key: key.endswith("history"), part.by_key()):
             history = as_history(getattr(part, name))
             if history != STEADY or name in part.missing:

@@ -5,26 +5,29 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from foldyn.arguments import Check, Key
+from foldyn.arguments import Check, Key, Placed, Read
 from foldyn.cases.connectors import NEAR, Connector
-from foldyn.cases.decode import Factor, Part
+from foldyn.cases.decode import Factor, KindOf, Part, law_from
 from foldyn.cases.directions import Direction, Pairs
 from foldyn.cases.history import CONSTANT, STEADY, History
 from foldyn.cases.reached import Until
 from foldyn.cases.selection import Nodes, refuse_linear, resolve_nodes
 from foldyn.errors import FoldynWarning, InputError, quietly, warn
+from foldyn.materials import BAR_LAWS, BarLaw, bar_law
 from foldyn.mechanics.capstan import CapstanTerm
-from foldyn.mechanics.lines import GROUND, Lines
+from foldyn.mechanics.lines import GROUND, NO_LAW, Lines
 from foldyn.mechanics.springs import Springs, SpringsTerm
 from foldyn.structures.discretized import Discretized
 from foldyn.values import indices, number, show, single, vector
 
 SLACK = 1.001  # a cable that is this many times as long as its line at rest is said to be slack
+above = partial(Check, number, above=0.0)
 STEADY_NOW = (0.0, 0.0, 1.0, 0.0)  # see `Lines.now`
 
 
@@ -59,7 +62,7 @@ class Made:
         self.limits: list[float] = []  # N, of each line, beyond which it buckles
         self._directed: list[tuple[Any, ...]] = []  # ends, direction, stiffness, row
         self._lines: list[tuple[Any, ...]] = []  # l0, stretch, k, slack, scaled, change
-        self._row: list[tuple[int, int]] = []
+        self._whole: list[tuple[int, ...]] = []  # code, addresses, rows
 
     def number(self, history: Any) -> int:
         """Row of a history that varies; -1 for a constant one."""
@@ -76,11 +79,12 @@ class Made:
     def add_line(
         self, node: NDArray, x: NDArray, stiffness: float, natural: float | None,
         change: float = 0.0, rows: tuple[int, int] = (-1, -1), slack: bool = False,
-        scaled: bool = False, limit: float = math.inf,
+        scaled: bool = False, limit: float = math.inf, law: Any = None,
     ) -> None:  # fmt: skip
         """Add a line over points x (k, 3), which are nodes or `GROUND`.
 
         stiffness : k (N/m), or EA (N) if `scaled`.
+        law : BarLaw, instead of a tension in proportion to l - l0.
         """
         whole = math.fsum(np.linalg.norm(np.diff(x, axis=0), axis=1).tolist())
         own = whole if natural is None else natural
@@ -90,7 +94,8 @@ class Made:
         self.points.append((node, x))
         self.limits.append(limit)
         self._lines.append((own, whole - own, k, slack, scaled, change))
-        self._row.append(rows)
+        code, addresses = (law.code, law.addresses) if law else (NO_LAW, None)
+        self._whole.append((code, *(addresses or (0, 0, 0)), *rows))
 
     def springs(self) -> Springs:
         """All that was added, as arrays."""
@@ -99,12 +104,13 @@ class Made:
         vectors = [row for _, x in self.points for row in (np.diff(x, axis=0), end)]
         along = np.concatenate([end[:0], *vectors])
         natural, stretch, k, slack, scaled, change = _columns(self._lines, 6)
+        whole = np.array(self._whole, np.int64).reshape(-1, 6)
         lines = Lines(
             np.cumsum([0, *map(len, node)]).astype(np.int64),
             np.concatenate([np.zeros(0, np.int64), *node]),
             along, np.linalg.norm(along, axis=1), natural, stretch, k, slack.astype(bool),
-            scaled.astype(bool), change, np.array(self._row, np.int64).reshape(-1, 2),
-            np.tile(STEADY_NOW, (len(k), 1)),
+            scaled.astype(bool), change, whole[:, 0].copy(), whole[:, 1:4].copy(),
+            whole[:, 4:].copy(), np.tile(STEADY_NOW, (len(k), 1)),
         )  # fmt: skip
         return Springs(
             ends.reshape(-1, 2).astype(np.int64), direction.reshape(-1, 3), stiffness,
@@ -211,8 +217,8 @@ class Bar(Elastic):
     ----------
     between : sequence of int, or of pairs of them
         Two nodes, such as (0, 5), or several pairs with a bar each.
-    stiffness : float
-        EA of each bar (N), above 0.
+    stiffness : float, optional
+        EA of each bar (N), above 0; or give `area` and `modulus`.
     rest_length : float, optional
         Length without force (m), above 0; the distance of the nodes at rest by default.
     bending : float, optional
@@ -222,21 +228,47 @@ class Bar(Elastic):
         Mass (kg) of each bar, spread evenly along it: m/6 [2 1; 1 2] at its ends.
     until : float or mapping, optional
         When the bars are released; see `Fix`.
+    area, modulus : float, optional
+        Area of the cross-section (m2) and Young's modulus (Pa), above 0, instead of `stiffness`.
+    law : {"ogden", "linear"} or BarLaw, optional
+        Law as of the bars of a sheet, "linear" in Green strain. Without it, the tension is EA
+        (l/l0 - 1), with l the length and l0 that without force.
+
+    Notes
+    -----
+    With a law, a bar of the stretch lambda = l/l0 has the tension EA lambda S and the energy EA l0
+    W, with S the second Piola-Kirchhoff stress and W the energy density per Young's modulus. Of
+    "ogden", S = (lambda^3 - 1/lambda)/4 (Liu and Paulino, Proc. R. Soc. A 473, 2017); of "linear",
+    S = (lambda^2 - 1)/2 (St. Venant and Kirchhoff).
     """
 
     between: Annotated[Pairs, Key("bar")]
-    stiffness: Annotated[float, Check(number, above=0.0, unit="N"), Key("bar_stiffness")]
-    rest_length: Annotated[float | None, Check(number, above=0.0, unit="m"), Key("bar_length")] = (
-        None
-    )
-    bending: Annotated[float | None, Check(number, above=0.0, unit="N m2"), Key("bar_bending")] = (
-        None
-    )
+    stiffness: Annotated[float | None, above(unit="N"), Key("bar_stiffness")] = None
+    rest_length: Annotated[float | None, above(unit="m"), Key("bar_length")] = None
+    bending: Annotated[float | None, above(unit="N m2"), Key("bar_bending")] = None
     mass: Annotated[float, Check(number, least=0.0, unit="kg"), Key("bar_mass")] = 0.0
     until: Until = None
+    area: Annotated[float | None, above(unit="m2"), Key("bar_area")] = None
+    modulus: Annotated[float | None, above(unit="Pa"), Key("bar_modulus")] = None
+    law: Annotated[
+        str | BarLaw | None, Placed(bar_law, field=""), Key("bar_law"),
+        Read(KindOf(law_from, BAR_LAWS, named=True, laws=BAR_LAWS)),
+    ] = None  # fmt: skip
 
-    missing = {"bar_stiffness": "give EA (N) of the bars"}
+    either = ("bar_stiffness",), ("bar_area", "bar_modulus")
     apart = "bars are a support of their own"
+
+    def agree(self) -> None:
+        """Require EA, or both of its factors."""
+        given = self.given("stiffness", "area", "modulus")
+        if given not in (["stiffness"], ["area", "modulus"]):
+            name = (given or ["stiffness"])[-1]
+            raise InputError(": give either EA (N), or both area (m2) and modulus (Pa)", name)
+
+    @property
+    def axial_stiffness(self) -> float:
+        """EA (N)."""
+        return self.stiffness or float(self.area * self.modulus)  # type: ignore[operator]
 
     def add_to(self, made: Made, place: str) -> None:
         """See `Elastic`."""
@@ -246,8 +278,8 @@ class Bar(Elastic):
             length = float(np.linalg.norm(x[1] - x[0]))
             _refuse_coincident(structure, x, list(map(int, pair)), f"{place}.between[{k}]")
             own = self.rest_length or length
-            limit = math.pi**2 * self.bending / length**2 if self.bending else math.inf
-            made.add_line(pair, x, self.stiffness, own, scaled=True, limit=limit)
+            most = math.pi**2 * self.bending / length**2 if self.bending else math.inf
+            made.add_line(pair, x, self.axial_stiffness, own, scaled=True, limit=most, law=self.law)
 
 
 def _refuse_coincident(
@@ -318,17 +350,13 @@ class Cable(Elastic):
     """
 
     nodes: Annotated[Sequence[Any], Check(_points), Key("cable")]
-    stiffness: Annotated[float, Check(number, above=0.0, unit="N"), Key("cable_stiffness")]
-    rest_length: Annotated[
-        float | None, Check(number, above=0.0, unit="m"), Key("cable_length")
-    ] = None
+    stiffness: Annotated[float, above(unit="N"), Key("cable_stiffness")]
+    rest_length: Annotated[float | None, above(unit="m"), Key("cable_length")] = None
     pretension: Annotated[float | None, Check(number, least=0.0, unit="N")] = None
     change: Annotated[float, Check(number, unit="m"), Key("cable_change")] = 0.0
     history: Factor = STEADY
     friction: Annotated[float, Check(number, least=0.0), Key("cable_friction")] = 0.0
-    sliding_speed: Annotated[
-        float, Check(number, above=0.0, unit="m/s"), Key("cable_sliding_speed")
-    ] = 1e-3
+    sliding_speed: Annotated[float, above(unit="m/s"), Key("cable_sliding_speed")] = 1e-3
     until: Until = None
 
     missing = {"cable_stiffness": "give EA (N) of the cable"}

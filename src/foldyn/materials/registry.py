@@ -23,9 +23,9 @@ HINGE_LAWS: Mapping[str, type[HingeLaw]] = {
 }
 
 
-def bar_law(spec: str | BarLaw) -> BarLaw:
+def bar_law(spec: str | BarLaw, field: str = "bar_law") -> BarLaw:
     """Law of a bar from its name ("ogden", "linear") or a law object."""
-    return _law(spec, BAR_LAWS, BarLaw, "bar_law")
+    return _law(spec, BAR_LAWS, BarLaw, field)
 
 
 def hinge_law(spec: str | HingeLaw, field: str = "hinge law") -> HingeLaw:

@@ -2,7 +2,10 @@
 
 A line runs straight from point to point, nodes or points on the ground, and slides over those in
 between without friction: all its pieces have the tension k (l - l0), with l the sum of their
-lengths. A cable is slack, without force, where l is below l0.
+lengths. A cable is slack, without force, where l is below l0. A bar may have a law instead
+(`materials.switch`), of the strain e = l/l0 - 1 that it has throughout: with S and W the second
+Piola-Kirchhoff stress and the energy per modulus, its tension is k l0 (1 + e) S(e), its energy k
+l0^2 W(e).
 
 The force-free length l0 and the stiffness k may change in time: l0 by `change` times the factor of
 a history, as by a winch, and k as the factor of another. Of lines that are given by EA, k = EA/l0
@@ -18,7 +21,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from foldyn.jit.compiled import inner, inner_scalar, kernel
+from foldyn.materials.switch import bar_energy, bar_slope, bar_stress
+from foldyn.mechanics.discrete_gradient import mean_stress
 
+NO_LAW = -2  # in place of a law's code: lines that are linear in their length
 GROUND = -1  # stands for an end on the ground
 SOON = 1e-3  # share of a step below which a change from slack to taut does no harm
 JUST_TAUT = 1e-12  # share of its length by which a cable may be too long and still count as taut
@@ -37,7 +43,9 @@ class Lines(NamedTuple):
     slack: NDArray  # (c,) whether it has no force if l is below l0
     scaled: NDArray  # (c,) whether k l0 is constant
     change: NDArray  # (c,) of l0 at the factor 1, m
-    row: NDArray  # (c, 2) rows of the histories of l0 and k, -1 for none
+    code: NDArray  # (c,) of the law, or `NO_LAW`
+    addresses: NDArray  # (c, 3) of a user law's energy, stress and slope, otherwise 0
+    row: NDArray  # (c, 2) rows of the histories of l0 and k, -1 for none; none of lines with a law
     now: NDArray  # (c, 4) current change of l0 (m) and its rate, factor of k and its rate
 
 
@@ -91,6 +99,29 @@ def strength(lines, s, ahead):
 
 
 @inner_scalar
+def response(lines, s, beyond):
+    """Energy (m2), tension (m) and its slope of a line per k, at the extension `beyond`, m."""
+    if lines.code[s] == NO_LAW:
+        return 0.5 * beyond * beyond, beyond, 1.0
+    code, natural, address = lines.code[s], lines.natural[s], lines.addresses[s]
+    e = beyond / natural
+    stress = bar_stress(code, e, address[1])
+    slope = stress + (1.0 + e) ** 2 * bar_slope(code, e, address[2])
+    return natural**2 * bar_energy(code, e, address[0]), (natural + beyond) * stress, slope
+
+
+@inner_scalar
+def mean_pull(lines, s, first, last):
+    """Mean tension per k, m, whose work between two extensions (m) is the change of energy."""
+    if lines.code[s] == NO_LAW:
+        return 0.5 * (first + last)
+    natural = lines.natural[s]
+    x, middle = first / natural * (2.0 + first / natural), natural + 0.5 * (first + last)
+    change = middle * (last - first) / natural**2  # of the Green strain, of which S is the force
+    return middle * mean_stress(lines.code[s], lines.addresses[s], x, change)[0]
+
+
+@inner_scalar
 def idle(lines, s, beyond):
     """Whether a line is slack at the extension `beyond`, m."""
     return lines.slack[s] and beyond < 0.0
@@ -131,9 +162,9 @@ def pull_lines(lines, u, force):
         beyond = extension(lines, u, s, 0.0)
         if idle(lines, s, beyond):
             continue
-        k = strength(lines, s, 0.0)
+        k, reach = strength(lines, s, 0.0), response(lines, s, beyond)[1]
         for i in range(lines.first[s], lines.first[s + 1] - 1):
-            pull = per_length(lines, s, k * beyond, piece(lines, u, i)[1])
+            pull = per_length(lines, s, k * reach, piece(lines, u, i)[1])
             add_pull(lines, i, pull, u, u, force)
         if lines.row[s, 0] >= 0 or lines.row[s, 1] >= 0:
             power += 0.5 * beyond * beyond * _rate_of_strength(lines, s, k)
@@ -155,7 +186,7 @@ def _rate_of_strength(lines, s, k):
 def put_tensions(lines, u, out):
     """Put the tensions (c,) of all lines, N, to `out`; those of slack ones as if they pushed."""
     for s in range(lines.stiffness.size):
-        out[s] = strength(lines, s, 0.0) * extension(lines, u, s, 0.0)
+        out[s] = strength(lines, s, 0.0) * response(lines, s, extension(lines, u, s, 0.0))[1]
 
 
 @inner
@@ -163,15 +194,15 @@ def lines_energy(lines, u):
     """Energy of all lines, J."""
     energy = 0.0
     for s in range(lines.stiffness.size):
-        energy += strength(lines, s, 0.0) * _half_square(lines, u, s, 0.0)[1]
+        energy += strength(lines, s, 0.0) * _stored(lines, u, s, 0.0)[1]
     return energy
 
 
 @inner_scalar
-def _half_square(lines, u, s, ahead):
+def _stored(lines, u, s, ahead):
     """Extension of a line, and the energy per stiffness."""
     beyond = extension(lines, u, s, ahead)
-    return beyond, 0.0 if idle(lines, s, beyond) else 0.5 * beyond * beyond
+    return beyond, 0.0 if idle(lines, s, beyond) else response(lines, s, beyond)[0]
 
 
 @inner
@@ -182,12 +213,12 @@ def pull_on_average(lines, u0, u1, h, force):
     """
     power = 0.0
     for s in range(lines.stiffness.size):
-        first, before = _half_square(lines, u0, s, -0.5 * h)
-        last, after = _half_square(lines, u1, s, 0.5 * h)
+        first, before = _stored(lines, u0, s, -0.5 * h)
+        last, after = _stored(lines, u1, s, 0.5 * h)
         if before == 0.0 and after == 0.0:
             continue
         soft, stiff = strength(lines, s, -0.5 * h), strength(lines, s, 0.5 * h)
-        mean = 0.5 * (first + last)
+        mean = mean_pull(lines, s, first, last)
         if lines.slack[s] and (first < 0.0 or last < 0.0):
             mean = (after - before) / (last - first)
         tension = 0.5 * (soft + stiff) * mean
@@ -230,15 +261,16 @@ def line_blocks(lines, u, loose, out):
         beyond, k = extension(lines, u, s, 0.0), strength(lines, s, 0.0)
         if lines.slack[s] and beyond < -JUST_TAUT * (lines.natural[s] + lines.now[s, 0]):
             continue
+        _, reach, slope = response(lines, s, beyond)
         rates = room[:points]
         line_rates(lines, u, s, rates)
         for a in range(size):
             for b in range(size):
-                block[a, b] = k * rates[a // 3, a % 3] * rates[b // 3, b % 3]
+                block[a, b] = k * slope * rates[a // 3, a % 3] * rates[b // 3, b % 3]
         for j in range(0 if loose and beyond < 0.0 else points - 1):
             i = lines.first[s] + j
             length = piece(lines, u, i)[1]
-            pull = per_length(lines, s, k * beyond, length)
+            pull = per_length(lines, s, k * reach, length)
             for a in range(3):
                 for b in range(3):
                     product = along(lines, u, i, a) * along(lines, u, i, b)
@@ -259,15 +291,18 @@ def differentiate_lines(lines, out, u, weights, added):
         k, growth = strength(lines, s, 0.0), 0.0  # growth: rate of l for velocities `weights`
         for i in range(lines.first[s], lines.first[s + 1] - 1):
             growth += growth_of(lines, u, weights, i)[0]
-        out.stretch[s] += k * growth
-        out.stiffness[s] += beyond * growth
+        _, reach, slope = response(lines, s, beyond)
+        out.stretch[s] += k * slope * growth
+        out.stiffness[s] += reach * growth
+        if lines.code[s] != NO_LAW:
+            out.natural[s] += k * (reach - slope * beyond) / lines.natural[s] * growth
         for i in range(lines.first[s], lines.first[s + 1] - 1):
             own, length = growth_of(lines, u, weights, i)
-            pull = per_length(lines, s, k * beyond, length)
+            pull = per_length(lines, s, k * reach, length)
             by_length = 0.0  # derivative by the length of the piece
             if length > 0.0:
-                by_length = 0.0 if free(lines, s) else k * growth - pull * own
-                out.length[i] += by_length * lines.length[i] / length - k * growth
+                by_length = 0.0 if free(lines, s) else k * slope * growth - pull * own
+                out.length[i] += by_length * lines.length[i] / length - k * slope * growth
                 by_length /= length
             for c in range(3):
                 by = pull * between(lines, weights, i, c)

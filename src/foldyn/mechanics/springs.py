@@ -53,7 +53,7 @@ from foldyn.mechanics.term import (
 )
 
 GROUP = "strain_springs"
-STEADY = ("change", "natural", "now")  # arrays of lines without influence on steady ones
+STEADY = ("change", "now", "addresses")  # arrays of lines without influence on steady ones
 
 
 class Springs(NamedTuple):
@@ -344,7 +344,7 @@ class SpringsTerm(Term):
         lines = self.springs.lines
         if not lines.slack.any():
             return self
-        off = np.minimum(self.tensions(q) / lines.stiffness, 0.0)
+        off = np.minimum(self.tensions(q) / lines.stiffness, 0.0) * lines.slack
         slack = lines._replace(slack=np.zeros_like(lines.slack), stretch=lines.stretch - off)
         return SpringsTerm(self.springs._replace(lines=slack), self.histories)
 

@@ -132,7 +132,7 @@ class CaseArrays:
             first = self._slots
             self._add(plus)
             self._again(minus, 0, first)
-        same = "first", "node", "slack", "scaled", "row"
+        same = "first", "node", "slack", "scaled", "code", "addresses", "row"
         stacked = _stacked([each.lines for each in own], same)
         plain = [each._replace(lines=()) for each in own]
         return _stacked(plain, ("ends", "row", "lines"))._replace(lines=stacked)
@@ -212,7 +212,7 @@ def topology(packed: PackedCase) -> tuple[Any, ...]:
             arrays += term.membranes[:3]
         elif isinstance(term, SpringsTerm):
             own = term.springs.lines
-            arrays += [term.springs.ends, own.first, own.node, own.slack, own.scaled]
+            arrays += [term.springs.ends, own.first, own.node, own.slack, own.scaled, own.code]
         elif isinstance(term, DampingMatrix):
             arrays += [term.matrix.indptr, term.matrix.indices]
         elif isinstance(term, ViscousTerm):

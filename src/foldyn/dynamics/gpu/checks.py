@@ -98,6 +98,8 @@ def lacking(case: Case, packed: PackedCase) -> str:
             return f"the term {type(term).__name__.removesuffix('Term')}"
         if term.histories:
             return "a spring or cable that follows a history"
+        if isinstance(term, SpringsTerm) and term.springs.lines.addresses.any():
+            return "a bar with a law of your own"
         if isinstance(term, ViscousTerm) and _mixed(term.elements):
             return "a damper at nodes and at dofs without mass"
         if isinstance(term, MembranesTerm) and len(term.membranes.stiffness) > MOST_BARS:

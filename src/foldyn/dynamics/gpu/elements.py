@@ -24,6 +24,7 @@ directed_extension = ported(springs.directed_extension)
 piece, extension = ported(lines.piece), ported(lines.extension)
 along = ported(lines.along)
 strength, idle, per_length = ported(lines.strength), ported(lines.idle), ported(lines.per_length)
+response = ported(lines.response)
 
 
 class Counts(NamedTuple):
@@ -180,7 +181,8 @@ def springs_to(all_springs, m, group, u, slot, size, at_slot, who, crowd, sample
         Lines(
             every.first, every.node, at(every.vector, m), at(every.length, m),
             at(every.natural, m), at(every.stretch, m), at(every.stiffness, m), every.slack,
-            every.scaled, at(every.change, m), every.row, at(every.now, m),
+            every.scaled, at(every.change, m), every.code, every.addresses, every.row,
+            at(every.now, m),
         ),
     )  # fmt: skip
     line, directed, count = own.lines, own.ends.shape[0], own.lines.stiffness.shape[0]
@@ -197,8 +199,9 @@ def springs_to(all_springs, m, group, u, slot, size, at_slot, who, crowd, sample
         beyond, stiff = extension(line, u, s, 0.0), strength(line, s, 0.0)
         if idle(line, s, beyond):
             beyond = 0.0
+        stored, reach, _ = response(line, s, beyond)
         for i in range(line.first[s], line.first[s + 1] - 1):
-            pull = per_length(line, s, stiff * beyond, piece(line, u, i)[1])
+            pull = per_length(line, s, stiff * reach, piece(line, u, i)[1])
             put(
                 slot, size, at_slot + directed + i - s,  # a line has a piece less than points
                 pull * along(line, u, i, 0),
@@ -206,7 +209,7 @@ def springs_to(all_springs, m, group, u, slot, size, at_slot, who, crowd, sample
                 pull * along(line, u, i, 2),
             )  # fmt: skip
         if sampled:
-            strain[group] += 0.5 * stiff * beyond * beyond
+            strain[group] += stiff * stored
     return at_slot + directed + line.node.shape[0] - count
 
 
