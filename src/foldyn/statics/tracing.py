@@ -181,6 +181,8 @@ def trace(
     if waiting(case) and plan.durations:
         raise InputError(": a path that takes time releases nothing; leave it out", "duration")
     steady = constant_numbers(case, constant)
+    if initial is not None:
+        displacement_of(initial, case, "initial")
     _check_case(case, plan, steady, adaptive_load is not None)
     given = {
         "method": method,
