@@ -144,17 +144,12 @@ def check_touching(case: Case, u: NDArray, start: float, end: float) -> None:
     except InputError:  # a failing function: the motion will stop there, with the reason
         return
     along, shapes = factors[len(obstacles) :], [shape for shape, _ in driven]
-    check_driven(
-        case,
-        (
-            (
-                f"t = {time:.6g} s",
-                sum((f * s for f, s in zip(along[:, k] - along[:, 0], shapes, strict=True)), u),
-                case.planes_moved(factors[: len(obstacles), k]),
-            )
-            for k, time in enumerate(times)
-        ),
+    moved = (
+        sum((f * s for f, s in zip(step, shapes, strict=True)), u)
+        for step in (along - along[:, :1]).T
     )
+    planes = map(case.planes_moved, factors[: len(obstacles)].T)
+    check_driven(case, zip((f"t = {time:.6g} s" for time in times), moved, planes, strict=True))
 
 
 def _check_tied_velocity(case: Case, velocity: NDArray) -> None:

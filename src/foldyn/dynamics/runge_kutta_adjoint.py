@@ -82,9 +82,8 @@ def pull_steps(
     lumped, count = case.solve == 0, by_u.size
     y, product, rate = memory[0], memory[1], memory[2]
     yn, pn, rn, both = flat(y), flat(product), flat(rate), flat(memory[6])
-    ka, su, sv, lu, lv = (
-        flat(memory[3]), flat(memory[4]), flat(memory[5]), flat(by_u), flat(by_v)
-    )  # fmt: skip
+    ka, su, sv = flat(memory[3]), flat(memory[4]), flat(memory[5])
+    lu, lv = flat(by_u), flat(by_v)
     force, inverse = flat(scratch.force), flat(case.mass.inverse)
     for i in range(count):
         both[i] = 0.0

@@ -60,10 +60,9 @@ class _Backward(NamedTuple):
 
 @pullback
 def _pullback(own, u, v, t, weight, product, rate):
-    moved, weights, out = (
-        rows_at(u, own.rows), rows_at(weight, own.rows), rows_at(product, own.rows)
-    )  # fmt: skip
-    pull_membranes(own.own, own.back, flat(moved), flat(weights), own.rows, flat(out))
+    moved, weights = flat(rows_at(u, own.rows)), flat(rows_at(weight, own.rows))
+    out = flat(rows_at(product, own.rows))
+    pull_membranes(own.own, own.back, moved, weights, own.rows, out)
 
 
 class _Context(NamedTuple):
