@@ -190,14 +190,12 @@ def _driven(case: Case, histories: list[History], terms: Sequence[Any]) -> Assem
 
 
 def _entries(terms, histories) -> Entries:
-    dofs, values, rows = [np.zeros(0, np.int64)], [np.zeros(0)], [np.zeros(0, np.int64)]
+    parts = [(np.zeros(0, np.int64), np.zeros(0), np.zeros(0, np.int64))]
     for vector, history in terms:
         entries = np.ravel(vector)
         where = np.flatnonzero(entries)
-        dofs.append(where)
-        values.append(entries[where])
-        rows.append(np.full(len(where), histories.index(history)))
-    return Entries(*map(np.concatenate, (dofs, values, rows)))
+        parts.append((where, entries[where], np.full(len(where), histories.index(history))))
+    return Entries(*map(np.concatenate, zip(*parts, strict=True)))
 
 
 def _ordered(entries: Entries) -> Entries:

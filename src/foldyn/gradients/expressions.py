@@ -97,15 +97,15 @@ def parse(text: str) -> Expression:
     InputError
         The text cannot be read, or contains anything else; the message quotes text and place.
     """
-    if not isinstance(text, str) or not text.strip():
-        raise InputError(f" = {show(text)}: must be an expression of measures; {EXAMPLE}")
-    tree = _read(text, EXAMPLE)
+    tree = _read(text, "an expression of measures", EXAMPLE)
     if isinstance(tree, ast.Compare):
         _refuse(text, tree, "is a comparison; one belongs in subject_to, an expression here")
     return _expression(text.strip(), tree, text)
 
 
-def _read(text: str, example: str) -> ast.expr:
+def _read(text: str, what: str, example: str) -> ast.expr:
+    if not isinstance(text, str) or not text.strip():
+        raise InputError(f" = {show(text)}: must be {what}; {example}")
     try:
         return trees.parse(text.strip())
     except InputError as error:
@@ -311,9 +311,7 @@ def constraint(text: str) -> Constraint:
         The text cannot be read, or is not a constraint.
     """
     example = 'write for example "frequency[1] == 12" or "mass <= 0.1"'
-    if not isinstance(text, str) or not text.strip():
-        raise InputError(f" = {show(text)}: must be a constraint; {example}")
-    tree = _read(text, example)
+    tree = _read(text, "a constraint", example)
     if not isinstance(tree, ast.Compare):
         raise InputError(f" = {show(text)}: compares nothing; {example}")
     if len(tree.ops) != 1:

@@ -143,7 +143,7 @@ def meshed(
     up, down = np.argwhere(sums < n), np.argwhere(sums < n - 1)
     rising = [place[*(up + step).T] for step in ((0, 0), (1, 0), (0, 1))]
     falling = [place[*(down + step).T] for step in ((1, 0), (1, 1), (0, 1))]
-    small = np.hstack([rising, falling]).T
+    small = np.concatenate([np.stack(rising, axis=1), np.stack(falling, axis=1)])
     weights = np.column_stack([n - i - j, i, j]) / n
     everywhere = np.concatenate([weights @ points[list(facet)] for facet in facets])
     _, first, same = np.unique(everywhere.round(7), axis=0, return_index=True, return_inverse=True)
