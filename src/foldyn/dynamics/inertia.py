@@ -73,8 +73,6 @@ def inertia(mass: sparse.csr_array, fixed: NDArray, ties: Ties, hidden: NDArray)
     """
     rows = np.ones((-(-len(hidden) // 3), 3))  # padding has the inertia 1
     rows.ravel()[: len(hidden)] = hidden
-    mass = sparse.csr_array(mass)
-    mass.sort_indices()
     diagonal = mass.diagonal()
     lumped = is_lumped(mass) and not len(ties.slave)
     inverse, factor_of_axis, factors = np.zeros((0, 3)), np.zeros(3, np.int64), []

@@ -343,12 +343,3 @@ def inertia_tensor(nodes: NDArray, mass: sparse.csr_array) -> NDArray:
     arm = nodes - center_of_mass(nodes, mass)
     second = arm.T @ (mass @ arm)
     return np.trace(second) * np.eye(3) - second
-
-
-def rotational_inertia(mass: sparse.csr_array, nodes: NDArray, start: int, end: int) -> float:
-    """Moment of inertia (kg m2) of a mass matrix about the line through two nodes."""
-    axis = nodes[end] - nodes[start]
-    axis = axis / np.linalg.norm(axis)
-    arm = nodes - nodes[start]
-    arm = arm - np.outer(arm @ axis, axis)
-    return float(sum(arm[:, c] @ (mass @ arm[:, c]) for c in range(3)))
