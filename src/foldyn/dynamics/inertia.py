@@ -130,9 +130,8 @@ def _join(factors: list[tuple]) -> tuple[NDArray, ...]:
     def column(parts: Iterable[NDArray], kind: type) -> NDArray:
         return np.concatenate([np.zeros(0, kind), *parts]).astype(kind)
 
-    nodes, rows, columns, lowers, uppers, pivots = (
-        zip(*factors, strict=True) if factors else 6 * [()]
-    )
+    parted = zip(*factors, strict=True) if factors else 6 * [()]
+    nodes, rows, columns, lowers, uppers, pivots = parted
     joined = [column(parts, np.int64) for parts in (nodes, rows, columns)]
     for triangles in (lowers, uppers):
         # each factor ends with a closing pointer, so columns of factor k start at start[k] + k

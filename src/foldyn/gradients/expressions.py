@@ -283,9 +283,8 @@ class Constraint:
 
     def value_and_slopes(self, values: Mapping[str, float]) -> tuple[float, dict[str, float]]:
         """`value`, and its derivatives with respect to all measures."""
-        (left, slopes), (right, others) = (
-            side.value_and_slopes(values) for side in (self.left, self.right)
-        )
+        left, slopes = self.left.value_and_slopes(values)
+        right, others = self.right.value_and_slopes(values)
         return left - right, {n: slopes.get(n, 0.0) - others.get(n, 0.0) for n in self.measures}
 
     def size(self, values: Mapping[str, float]) -> float:
@@ -297,9 +296,9 @@ class Constraint:
 
     def violation(self, difference: float) -> float:
         """Violation for a difference of the two sides; 0 if the constraint is satisfied."""
-        return {"==": abs(difference), "<=": max(difference, 0.0), ">=": max(-difference, 0.0)}[
-            self.sense
-        ]
+        if self.sense == "==":
+            return abs(difference)
+        return max(difference if self.sense == "<=" else -difference, 0.0)
 
 
 def constraint(text: str) -> Constraint:

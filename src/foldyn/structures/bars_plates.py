@@ -316,9 +316,8 @@ class BarsPlatesTerm(SheetTerm):
         edges = place[::3][model.hinges[model.rotation_hinge, :2]].min(axis=1)
         # number -1 comes last
         lowest = np.append(place[::3][model.hinges].min(axis=1), edges[::-1])
-        plates = np.array(
-            [lowest[model.angle[a:b]].min(initial=1) for a, b in pairwise(model.start)]
-        )
+        own = (lowest[model.angle[a:b]] for a, b in pairwise(model.start))
+        plates = np.array([numbers.min(initial=1) for numbers in own])
         return self._with(
             bars=self._bars.anchored(place).model,
             fold_stiffness=model.fold_stiffness * (lowest[: len(model.fold_rest)] == 0),

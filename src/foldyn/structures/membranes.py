@@ -25,7 +25,6 @@ between them, its *gives*. Near a vertex where the sheet is smooth
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -67,7 +66,7 @@ class Sides(NamedTuple):
 
 def membranes(
     mesh: Mesh, pattern: Pattern, sheet: Sheet, straight: Collection[Edge], rigid: Collection[int],
-    giving: bool = False, guided: Mapping[Edge, NDArray] = MappingProxyType({}),
+    giving: bool, guided: Mapping[Edge, NDArray],
 ) -> tuple[tuple[PanelKind, ...], NDArray]:  # fmt: skip
     """Membranes of all panels, and the edges (g, 2) of the gives, by number.
 

@@ -198,9 +198,8 @@ class Structure(Discretized):
         if not len(self.clamps):
             return body
         clamps = edge_angles.clamps_model(self.nodes, self.clamps, self.clamp_stiffness)
-        return body.with_terms(
-            ClampsTerm(clamps, (materials.LinearHinge(), materials.LinearHinge()))
-        )
+        linear = materials.LinearHinge()
+        return body.with_terms(ClampsTerm(clamps, (linear, linear)))
 
     def _coupled(self, sheet: BarsHingesTerm | BarsPlatesTerm) -> Assembly:
         """A body: the sheet, with the membranes of the panels in place of independent bars."""
@@ -393,9 +392,8 @@ class Structure(Discretized):
             is the exact second derivative of the energy: singular at rest where superlinear bends
             have no slope.
         """
-        return balanced(
-            self.body.tangent(self.body.dofs(self._displacement(u)), floor), self.body.hidden
-        )
+        tangent = self.body.tangent(self.body.dofs(self._displacement(u)), floor)
+        return balanced(tangent, self.body.hidden)
 
     def dihedrals(self, u: ArrayLike) -> tuple[NDArray, NDArray]:
         """Dihedrals (rad) of folds (nf,) and bends (nh,) at displacement u (n, 3), m."""

@@ -285,11 +285,8 @@ def kernel(method: str, wide: bool, shared: bool, plates: bool) -> Any:
         u, v, angle = state.u[m], state.v[m], state.angle[m]
         du, dv = state.first[m], state.second[m]
         mass, inverse, alpha = at(nodes.mass, m), at(nodes.inverse, m), nodes.alpha[m]
-        load_start, load, load_row = (
-            at(nodes.load_start, m),
-            at(nodes.load, m),
-            at(nodes.load_row, m),
-        )
+        load_start = at(nodes.load_start, m)
+        load, load_row = at(nodes.load, m), at(nodes.load_row, m)
         if plates:
             table, of = elements.plates, elements.plates.model
             sheet = BarsPlates(

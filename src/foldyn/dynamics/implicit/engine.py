@@ -204,13 +204,12 @@ class ImplicitEngine(Engine):
         return Outcome.DONE, -1
 
     def _begin(self, out: Samples) -> int:
-        scheme, plan = self.scheme, self._plan
+        scheme, plan, packed = self.scheme, self._plan, self._packed
         scheme.begin(plan.start)
         self._state.tally.farthest = _largest(scheme.displacement())
-        if self._packed.system.varies and not plan.steps:
-            self._horizon = impulse_duration(
-                scheme, self._matrix, self._packed, plan.end - plan.start
-            )
+        if packed.system.varies and not plan.steps:
+            whole = plan.end - plan.start
+            self._horizon = impulse_duration(scheme, self._matrix, packed, whole)
         if self._touching is not None:
             self._touching.begin()
         self._newton.prepare(plan.dt, plan.start)
