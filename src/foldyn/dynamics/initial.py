@@ -144,10 +144,8 @@ def check_touching(case: Case, u: NDArray, start: float, end: float) -> None:
     except InputError:  # a failing function: the motion will stop there, with the reason
         return
     along, shapes = factors[len(obstacles) :], [shape for shape, _ in driven]
-    moved = (
-        sum((f * s for f, s in zip(step, shapes, strict=True)), u)
-        for step in (along - along[:, :1]).T
-    )
+    steps = (along - along[:, :1]).T
+    moved = (sum((f * s for f, s in zip(step, shapes, strict=True)), u) for step in steps)
     planes = map(case.planes_moved, factors[: len(obstacles)].T)
     check_driven(case, zip((f"t = {time:.6g} s" for time in times), moved, planes, strict=True))
 

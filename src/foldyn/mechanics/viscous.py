@@ -42,15 +42,9 @@ class Viscous(NamedTuple):
 
 
 def viscous(
-    pairs: NDArray,
-    axial: NDArray,
-    axial_coefficient: NDArray,
-    hinges: NDArray,
-    corners: NDArray,
-    hidden: NDArray,
-    hidden_turn: NDArray,
-    hinge_coefficient: NDArray,
-) -> Viscous:
+    pairs: NDArray, axial: NDArray, axial_coefficient: NDArray, hinges: NDArray, corners: NDArray,
+    hidden: NDArray, hidden_turn: NDArray, hinge_coefficient: NDArray,
+) -> Viscous:  # fmt: skip
     """Pack elements.
 
     Parameters

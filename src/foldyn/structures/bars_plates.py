@@ -295,10 +295,8 @@ class BarsPlatesTerm(SheetTerm):
 
     def actuated(self, numbers: NDArray) -> tuple[Self, NDArray, NDArray]:
         """See `SheetTerm`."""
-        model = self.model
-        own = self._with(
-            fold_rest=model.fold_rest.copy(), fold_parameters=model.fold_parameters.copy()
-        )
+        rest, parameters = self.model.fold_rest.copy(), self.model.fold_parameters.copy()
+        own = self._with(fold_rest=rest, fold_parameters=parameters)
         return own, np.asarray(numbers), np.arange(len(numbers))
 
     def turned(self) -> tuple[NDArray, NDArray]:

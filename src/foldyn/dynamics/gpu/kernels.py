@@ -149,10 +149,8 @@ def dampers_to(dampers, m, u, v, slot, size, at_slot, who, crowd):
             rate += g[c] * v[own.dofs[e, c]]
         resisted = own.coefficient[e] * rate
         for k in range(4):
-            s = at_slot + k * count + e
-            put(
-                slot, size, s, resisted * g[3 * k], resisted * g[3 * k + 1], resisted * g[3 * k + 2]
-            )
+            s, i = at_slot + k * count + e, 3 * k
+            put(slot, size, s, resisted * g[i], resisted * g[i + 1], resisted * g[i + 2])
         slot[own.dofs[e, 12] % 3 * size + at_slot + e] += resisted * (g[12] + g[13])
         power += resisted * rate
     return power
@@ -180,9 +178,8 @@ def forces_to(
     s = panels_to(kinds[0], m, u, slot, size, s, who, crowd, sampled, strain)
     s = panels_to(kinds[1], m, u, slot, size, s, who, crowd, sampled, strain)
     s = panels_to(kinds[2], m, u, slot, size, s, who, crowd, sampled, strain)
-    s = springs_to(
-        elements.springs, m, counts.spring_group, u, slot, size, s, who, crowd, sampled, strain
-    )
+    springs, group = elements.springs, counts.spring_group
+    s = springs_to(springs, m, group, u, slot, size, s, who, crowd, sampled, strain)
     power = dampers_to(elements.viscous, m, flat_u, flat_v, slot, size, s, who, crowd)
     s += 4 * elements.viscous.dofs.shape[0]
     power += damping_to(elements.damping, m, counts.damped, flat_v, slot, size, s, who, crowd)
