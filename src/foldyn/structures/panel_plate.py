@@ -78,13 +78,9 @@ class Outline(NamedTuple):
 
 
 def outline(
-    x: NDArray,
-    center: NDArray | None,
-    creased: list[bool],
-    straight: list[bool],
-    bowed: Sequence[bool] = (),
-    clamped: Sequence[bool] = (),
-) -> Outline:
+    x: NDArray, center: NDArray | None, creased: list[bool], straight: list[bool],
+    bowed: Sequence[bool] = (), clamped: Sequence[bool] = (),
+) -> Outline:  # fmt: skip
     """Outline of a panel with corners x (m, 3), with size 1 and its first edge along an axis.
 
     By default no edge is bowed or clamped.
