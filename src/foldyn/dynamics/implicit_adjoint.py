@@ -150,7 +150,8 @@ class ImplicitAdjoint(Adjoint):
     def __init__(self, motion: Any, steps: Retraced) -> None:
         super().__init__(motion)
         packed, self._steps = self._packed, steps
-        self._matrix, self._scheme = StepMatrix(packed, True), steps.scheme
+        self._matrix = StepMatrix(packed, True)
+        self._scheme: Any = steps.scheme  # one with `parameters`
         shape = self._scheme.shift.shape
         free = np.zeros(shape, bool)
         free.ravel()[self._matrix.free] = True

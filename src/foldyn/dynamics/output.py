@@ -158,10 +158,8 @@ class Output:
     def checkpoint_arrays(self) -> dict[str, NDArray]:
         """Statistics of the samples on disk, for `resume_from`."""
         own = self.balance
-        return {
-            "balance_start": own.start,
-            "balance": np.array([getattr(own, name) for name in EnergyBalance.NUMBERS]),
-        }
+        numbers = np.array([getattr(own, name) for name in EnergyBalance.NUMBERS])
+        return {"balance_start": own.start, "balance": numbers}
 
     def resume_from(self, arrays: Mapping[str, NDArray], count: int) -> None:
         """Continue after `count` samples on disk, with the statistics in `arrays`."""

@@ -140,10 +140,8 @@ def pack(
     nodal = by.matrix(case.mass)
     ties = ties_of(case.constraints, by)
     mass = inertia(nodal, by.held(case.fixed), ties, hidden)
-    moves = [
-        (carry_supports(mass, by.inward(shape)), history)
-        for shape, history in (*case.imposed_terms, *case.base_terms)
-    ]
+    driven = (*case.imposed_terms, *case.base_terms)
+    moves = [(carry_supports(mass, by.inward(shape)), history) for shape, history in driven]
     loads = [(by.inward(vector), history) for vector, history in case.load_terms]
     parts = [(part, histories.index(history)) for part, history in case.following_terms]
     following = joined(parts).placed(by.rank)

@@ -73,10 +73,8 @@ class Expression:
         return found.value, dict(zip(self.measures, found.slope.tolist(), strict=True))
 
     def _at(self, values: Mapping[str, float], slopes: NDArray) -> _Number:
-        known = {
-            name: _Number(float(values[name]), slope)
-            for name, slope in zip(self.measures, slopes, strict=True)
-        }
+        pairs = zip(self.measures, slopes, strict=True)
+        known = {name: _Number(float(values[name]), slope) for name, slope in pairs}
         with np.errstate(all="ignore"):
             found = _worked(self.tree, known, slopes.shape[1])
         if not math.isfinite(found.value) or not np.isfinite(found.slope).all():

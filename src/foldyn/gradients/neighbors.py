@@ -192,10 +192,9 @@ def modes(found: Found, others: Sequence[Asked], wanted: Sequence[int]) -> list[
     """Modes of other cases, near those modes of `found` that have the numbers `wanted`."""
     linear, result = found.linear, found.result
     beside = [linear if each.case is linear.case else _linear(each) for each in others]
-    frequency, eigenvalue, ratio = (
-        [result[name].values.copy() for _ in others]
-        for name in ("frequency", "eigenvalue", "damping_ratio")
-    )
+    frequency = [result["frequency"].values.copy() for _ in others]
+    eigenvalue = [result["eigenvalue"].values.copy() for _ in others]
+    ratio = [result["damping_ratio"].values.copy() for _ in others]
     seen = result["shape"].transpose("mode", "node", "axis").values
     shapes = [seen.copy() for _ in others]
     assert not isinstance(linear.mass, Squared)  # large sheets in air have no gradients

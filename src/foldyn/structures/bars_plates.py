@@ -325,19 +325,12 @@ class BarsPlatesTerm(SheetTerm):
     def unstrained(self, q: NDArray) -> Unstrained | None:
         """See `SheetTerm`."""
         model, bars = self.model, self._bars.unstrained_model(q[: self._nodal])
-        angle, folds = self.angles(q), len(model.fold_rest)
-        sheet = self._with(
-            bars=bars,
-            fold_rest=angle[:folds],
-            bend_rest=angle[folds:],
-            code=np.full_like(model.code, LinearHinge.code),
-        )
+        folds, bends = np.split(self.angles(q), [len(model.fold_rest)])
+        code = np.full_like(model.code, LinearHinge.code)
+        sheet = self._with(bars=bars, fold_rest=folds, bend_rest=bends, code=code)
         rest = np.zeros(self.size)
-        return Unstrained(
-            sheet.tangent(rest),
-            sheet.hinges_alone().tangent(rest),
-            lambda motion: stretch(bars, motion[: self._nodal]),
-        )
+        tangent, turned = sheet.tangent(rest), sheet.hinges_alone().tangent(rest)
+        return Unstrained(tangent, turned, lambda motion: stretch(bars, motion[: self._nodal]))
 
 
 class ClampsTerm(BarsPlatesTerm):

@@ -235,11 +235,9 @@ def condensed_panels(surface: Surface) -> dict[int, NDArray]:
 def _without(surface: Surface, panels: NDArray) -> Surface:
     """The surface without the triangles of masked panels (np,)."""
     kept = ~panels[surface.triangle_panel]
-    return surface._replace(
-        triangles=surface.triangles[kept],
-        triangle_panel=surface.triangle_panel[kept],
-        triangle_area=surface.triangle_area[kept],
-    )
+    triangles, panel = surface.triangles[kept], surface.triangle_panel[kept]
+    area = surface.triangle_area[kept]
+    return surface._replace(triangles=triangles, triangle_panel=panel, triangle_area=area)
 
 
 def inertia_exact(surface: Surface) -> sparse.csr_array:

@@ -112,10 +112,8 @@ def membranes(
         alike = len(nodes), ends, int(shared.sum())
         kinds.setdefault(alike, []).append((p, nodes, number[shared], part))
     edges = np.array([edge for edge, _ in numbers], np.int64).reshape(-1, 2)
-    return tuple(
-        _packed(mesh.nodes, np.array(ends), *zip(*members, strict=True))
-        for (_, ends, _), members in kinds.items()
-    ), edges
+    parted = [(np.array(ends), zip(*own, strict=True)) for (_, ends, _), own in kinds.items()]
+    return tuple(_packed(mesh.nodes, ends, *columns) for ends, columns in parted), edges
 
 
 def _known(panel: Sides, sheet: Sheet, area: float, gives: bool, smooth: NDArray) -> Kind:
@@ -285,12 +283,10 @@ def swelling(
     x : (n, 3) rest positions of the nodes, m.
     """
     green, parts, pushes = strain + 0.5 * strain @ strain, [], []
-    strains = [
-        (np.einsum("bip,pij,bjp->bp", own.vector, green[which], own.vector) * own.per_length2)[
-            :, None
-        ]
-        for which, own in kinds
-    ]
+    strains = []
+    for which, own in kinds:
+        stretch = np.einsum("bip,pij,bjp->bp", own.vector, green[which], own.vector)
+        strains.append((stretch * own.per_length2)[:, None])
     for (_, own), both in zip(kinds, with_gives(kinds, strains), strict=True):
         push = np.einsum("ijp,jp->ip", own.stiffness[: len(own.ends)], both[:, 0])
         pushes.append(push.ravel())

@@ -248,10 +248,8 @@ class Structure(Discretized):
         onset = self.bend_onset if own else None
         folds = self.folds, self.fold_stiffness, self.fold_rest
         bends = self.bends, self.bend_stiffness, self.bend_rest
-        return (
-            HingeKind("fold", self.fold_law, *folds, softness=self._softness),
-            HingeKind("bend", law, *bends, onset=onset),
-        )
+        fold = HingeKind("fold", self.fold_law, *folds, softness=self._softness)
+        return fold, HingeKind("bend", law, *bends, onset=onset)
 
     @cached_property
     def mass(self) -> sparse.csr_array:
@@ -327,11 +325,8 @@ class Structure(Discretized):
         if len(self.clamps):
             parts.append(self._clamping(turning[count:]))
         push, count = self.body.sheet.per_hidden * moment[~on_hinge], len(plates.rotation_hinge)
-        return (
-            joined((part, 0) for part in parts),
-            np.bincount(-1 - plates.angle[~on_hinge], push, minlength=count),
-            moment,
-        )
+        pushes = np.bincount(-1 - plates.angle[~on_hinge], push, minlength=count)
+        return joined((part, 0) for part in parts), pushes, moment
 
     @cached_property
     def surface(self) -> Surface:

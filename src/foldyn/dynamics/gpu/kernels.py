@@ -95,13 +95,9 @@ class Span(NamedTuple):
 def panels_to(kind, m, u, slot, size, at_slot, who, crowd, sampled, strain):
     """Write forces on corners and gives of the panels of one kind; return the next free slot."""
     own = Membranes(
-        kind.nodes,
-        kind.ends,
-        kind.gives,
-        at(kind.vector, m),
-        at(kind.per_length2, m),
+        kind.nodes, kind.ends, kind.gives, at(kind.vector, m), at(kind.per_length2, m),
         at(kind.stiffness, m),
-    )
+    )  # fmt: skip
     count, corners, bars = own.nodes.shape[0], own.nodes.shape[1], own.ends.shape[0]
     given = own.gives.shape[1]
     stretch, along = cuda.local.array(MOST_BARS, float64), cuda.local.array(3, float64)
