@@ -187,10 +187,8 @@ class MembranesTerm(Term):
         size, places = (q.size, q.size), np.array(self.places)
         entries = self._entries(q, q, np.zeros(self.membranes.stiffness.shape[1:]))
         alone = np.isin(places, self.membranes.gives).all(axis=0)
-        tangent, kept = (
-            sparse.csr_array((entries[own], tuple(places[:, own])), size)
-            for own in (slice(None), alone)
-        )
+        tangent = sparse.csr_array((entries, tuple(places)), size)
+        kept = sparse.csr_array((entries[alone], tuple(places[:, alone])), size)
         return Unstrained(tangent, kept, lambda motion: 0.0)
 
     def strains(self, others: Strains) -> Strains:

@@ -188,10 +188,8 @@ def _numbered(corners: _Corners, half: int, panels: int) -> tuple[NDArray, int]:
         for edge, starts in zip((corners.ahead, corners.behind), corners.starts, strict=True)
     ]
     out[:, inside, 0], out[:, 0, inside] = ends
-    ways = [
-        spokes + corner[:, None] * len(inside) + inside - 1
-        for corner in (np.arange(count), corners.before)
-    ]
+    both = np.arange(count), corners.before
+    ways = [spokes + corner[:, None] * len(inside) + inside - 1 for corner in both]
     out[:, half, inside], out[:, inside, half] = ways
     own = grids + np.arange(count * len(inside) ** 2)
     out[:, 1:half, 1:half] = own.reshape(count, len(inside), len(inside))

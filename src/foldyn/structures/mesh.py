@@ -127,10 +127,8 @@ def _mesh(
         triangle_panel += [panel] * len(pieces)
         inner += bars
         inner_panel += [panel] * len(bars)
-    bends = [
-        (a, b, third[panel, a, b], third[panel, b, a])
-        for panel, (a, b) in zip(inner_panel, inner, strict=True)
-    ]
+    owned = zip(inner_panel, inner, strict=True)
+    bends = [(a, b, third[panel, a, b], third[panel, b, a]) for panel, (a, b) in owned]
 
     def hinges(*creases: NDArray) -> NDArray:
         rows = []
