@@ -91,17 +91,9 @@ def inertia(mass: sparse.csr_array, fixed: NDArray, ties: Ties, hidden: NDArray)
         free = [np.flatnonzero(~held) for held in distinct.T]
         factors = [_factor(mass[nodes][:, nodes], nodes) for nodes in free]
     return Inertia(
-        lumped,
-        diagonal,
-        inverse,
-        mass.indptr.astype(np.int64),
-        mass.indices.astype(np.int64),
-        mass.data.astype(float),
-        rows,
-        ties,
-        factor_of_axis.ravel(),
-        *_join(factors),
-    )
+        lumped, diagonal, inverse, mass.indptr.astype(np.int64), mass.indices.astype(np.int64),
+        mass.data.astype(float), rows, ties, factor_of_axis.ravel(), *_join(factors),
+    )  # fmt: skip
 
 
 def lightness(mass: Inertia) -> NDArray:
