@@ -97,7 +97,7 @@ class Samples(NamedTuple):
 def samples(count: int, nodes: int, supported: int, energies: int, branches: int = 0) -> Samples:
     """Room for `count` samples."""
     sizes = (), (nodes, 3), (nodes, 3), (supported,), (energies,), (branches, VARIABLES)
-    return Samples(*(np.empty((count, *size)) for size in sizes), 0)
+    return Samples._make((*(np.empty((count, *size)) for size in sizes), 0))
 
 
 @inner_scalar
