@@ -154,12 +154,9 @@ def _shallow(value: Any) -> Any:
     """Return `value` unless it is too deep for recursive functions."""
     level = [value]
     for _ in range(DEEPEST + 1):
-        level = [
-            inner
-            for item in level
-            if isinstance(item, (dict, list))
-            for inner in (item.values() if isinstance(item, dict) else item)
-        ]
+        deeper = [item for item in level if isinstance(item, (dict, list))]
+        parts = (item.values() if isinstance(item, dict) else item for item in deeper)
+        level = [inner for part in parts for inner in part]
         if not level:
             return value
     raise RecursionError

@@ -80,12 +80,8 @@ def closed(
     word : value of the key `kind` of the table, if it has this key.
     """
     kind = {"kind": {"enum": [word]}} if word else {}
-    schema = {
-        "type": "object",
-        "properties": {**kind, **properties},
-        "required": [*kind, *required],
-        "additionalProperties": False,
-    }
+    own, must = {**kind, **properties}, [*kind, *required]
+    schema = {"type": "object", "properties": own, "required": must, "additionalProperties": False}
     return described(schema, summary(thing))
 
 

@@ -44,6 +44,14 @@ def shares(vertices, mass, **options):
     return s.mass.diagonal() / total
 
 
+def rotational_inertia(structure, start, end):
+    """Moment of inertia (kg m2) about the line through two nodes."""
+    axis = structure.nodes[end] - structure.nodes[start]
+    axis = axis / np.linalg.norm(axis)
+    away = np.cross(structure.center_of_mass - structure.nodes[start], axis)
+    return axis @ structure.inertia @ axis + structure.total_mass * (away @ away)
+
+
 def exact_second_moments(s):
     """Integral of x x^T dm, 3 x 3, by the mid-edge rule: exact for quadratics on triangles."""
     x = s.nodes[s.triangles]

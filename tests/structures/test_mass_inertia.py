@@ -15,13 +15,13 @@ from mass_samples import (
     T,
     exact_second_moments,
     one,
+    rotational_inertia,
     second_moments,
     shares,
 )
 
 import foldyn as fd
 from foldyn.structures import MASS_RULES
-from foldyn.structures.mass import rotational_inertia
 
 # ---------------------------------------------------------------------------- inertia_exact
 
@@ -113,7 +113,7 @@ ABOUT_AN_EDGE = {
 def errors_about_edges(vertices, rule):
     """Relative errors; the consistent matrix is exact, distances being linear over triangles."""
     found, exact = (
-        [rotational_inertia(s.mass, s.nodes, a, b) for a, b in s.pattern.edges.tolist()]
+        [rotational_inertia(s, a, b) for a, b in s.pattern.edges.tolist()]
         for s in (one(vertices, rule), one(vertices, "consistent"))
     )
     return np.array(found) / exact - 1.0

@@ -126,19 +126,18 @@ def _with_memory(
     """Added mass of triangles (t, 3) on nodes (n, 3), and their matrix `catch` (u, 3t)."""
     unknown, count = catch.shape[0], len(triangles)
     corners = nodes[triangles.astype(np.int64)]
-    flow, resistance, guess = np.zeros((3, unknown, unknown))
-    area, rate = np.zeros((2, count, 3))
+    square = unknown, unknown
     return AddedMass(
         triangles=triangles.astype(np.int64),
         sides=np.ascontiguousarray(corners[:, 1:] - corners[:, :1]),
         start=catch.indptr.astype(np.int64),
         corner=catch.indices.astype(np.int64),
         catch=catch.data,
-        flow=flow,
-        resistance=resistance,
-        guess=guess,
-        area=area,
-        rate=rate,
+        flow=np.zeros(square),
+        resistance=np.zeros(square),
+        guess=np.zeros(square),
+        area=np.zeros((count, 3)),
+        rate=np.zeros((count, 3)),
         through=np.zeros(3 * count),
         lines=np.zeros((6, unknown)),
         nodal=np.zeros((2, rows, 3)),
@@ -192,7 +191,7 @@ def renewed_flow(case: Case, packed: Any, state: Any) -> bool:
     flux(own, own.area, v - own.blown[0], jump)
     lost = own.flow @ jump
     _find_flow(case, own, mass, packed.numbering.outward(state.u), state.u)
-    press(own, lost - own.flow @ jump, push)
+    add_push(own, own.area, lost - own.flow @ jump, push)
     solve(own, mass, push, change, line)
     v += change
     deforming = v - _rigid_part(case, packed, state)
@@ -227,7 +226,7 @@ def _rigid_part(case: Case, packed: Any, state: Any) -> NDArray:
     for shape, force in zip(shapes, pushes, strict=True):
         times_mass(packed.mass, shape, force)
         flux(own, own.area, shape, speed)
-        press(own, own.flow @ speed, force)
+        add_push(own, own.area, own.flow @ speed, force)
     inertia = np.tensordot(shapes, pushes, ((1, 2), (1, 2)))
     rates = np.linalg.lstsq(inertia, np.tensordot(pushes, v, 2), rcond=None)[0]
     return np.tensordot(rates, shapes, 1)
@@ -305,7 +304,7 @@ def flux(own, area, v, out):
         out[i] = total
 
 
-@inner
+@kernel
 def add_push(own, area, jump, force):
     """Add the nodal forces (rows, 3) of pressure jumps (u,), N/m2, through area vectors (t, 3)."""
     for e in range(own.through.size):
@@ -427,12 +426,6 @@ def turn_flow(m, u, v, powers):
 def solve_with_fluid(m, out):
     """Solve for accelerations with the mass and the added mass."""
     solve(m.added, m.mass, m.s.force, rows_at(out, m.s.force.shape[0]), m.s.line)
-
-
-@kernel
-def press(own, jump, force):
-    """Add the nodal forces B' jump to `force` (rows, 3), N."""
-    add_push(own, own.area, jump, force)
 
 
 @kernel

@@ -170,9 +170,8 @@ def doubts(
         )
     if balance.relative <= INACCURATE:
         return ""
-    off = (
-        f"the energy balance of the motion is off by {balance.relative:.1%} of the energies at play"
-    )
+    share = f"{balance.relative:.1%}"
+    off = f"the energy balance of the motion is off by {share} of the energies at play"
     hidden = rounding.energy(balance.largest, farthest)
     if balance.scale <= hidden:
         return (

@@ -80,7 +80,7 @@ class Accompanied(ImplicitEngine):
         t = end if jump is None else math.nextafter(min(end, jump), -math.inf)
         matrix = self._factors(h)
         for other in self._others:
-            other.follow(self._scheme, matrix, h, t)
+            other.follow(self.scheme, matrix, h, t)
         super()._accept(h, end, jump)
         if jump is not None:
             for other in self._others:
@@ -92,10 +92,10 @@ class Accompanied(ImplicitEngine):
         made = self._newton.origin
         if self._matrix.factorized and len(made) and abs(h - made[0][0]) <= SAME_STEP * h:
             return self._matrix
-        self._spare = self._spare or StepMatrix(self._packed, self._scheme.symmetric)
+        self._spare = self._spare or StepMatrix(self._packed, self.scheme.symmetric)
         try:
-            self._scheme.tangent(self._spare, self._scheme.moved(), False)
-            self._spare.factorize(self._scheme.weights(h))
+            self.scheme.tangent(self._spare, self.scheme.moved(), False)
+            self._spare.factorize(self.scheme.weights(h))
         except SingularTangentError as error:
             raise ComputationError(str(error)) from None
         return self._spare

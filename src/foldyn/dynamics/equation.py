@@ -389,13 +389,11 @@ class EquationOfMotion:
             lacks: tuple[int, int, NDArray] = 0, 0, np.zeros(0)
             if heat:
                 lacks = warm.at(heat), heat.address, heat.value.energy
-            self._recorder = recorder = Context(
-                Recorder(case.value, self._state, out, fluid, *lacks)
-            )
+            recorder = Context(Recorder(case.value, self._state, out, fluid, *lacks))
             self._sampled = Context(
                 self.handle.value._replace(sample=_sample.at(recorder), recorder=recorder.address)
             )
-            self._out = out
+            self._out, self._recorder = out, recorder
         return self._sampled
 
 

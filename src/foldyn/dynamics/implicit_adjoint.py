@@ -28,7 +28,6 @@ steps is stored at a time.
 from __future__ import annotations
 
 import math
-from bisect import bisect_left
 from collections.abc import Iterator
 from typing import Any, NamedTuple
 
@@ -39,6 +38,7 @@ from foldyn.dynamics.adjoint import Adjoint
 from foldyn.dynamics.implicit.engine import ImplicitEngine
 from foldyn.dynamics.implicit.matrix import StepMatrix
 from foldyn.dynamics.implicit.newton import SAME_STEP
+from foldyn.dynamics.implicit.scheme import StepEnd
 from foldyn.dynamics.inertia import times_mass
 from foldyn.dynamics.motion_state import samples
 from foldyn.dynamics.ties import hand_over
@@ -97,7 +97,7 @@ class Retraced(ImplicitEngine):
         given = packed, motion.beginning, unseen, jumps(motion.case)
         super().__init__(motion.method.scheme, *given)
         self.advance(self._room, 0)
-        self._at, self._begins = self._reached(plan.start), True
+        self._at, self._begins = self._reached(plan.start, self.scheme.old), True
         self._taken: list[Taken] = []
         apart = max(1, int(ROOM / (3 * self._at.q.nbytes)))
         self._places: list[Segment] = []
@@ -108,11 +108,6 @@ class Retraced(ImplicitEngine):
             self.advance(self._room, min(apart, plan.steps - first))
         self._ends = [*(place.number for place in self._places[1:]), plan.steps]
 
-    @property
-    def scheme(self) -> Any:
-        """Scheme of the steps."""
-        return self._scheme
-
     def back(self, first: int, last: int) -> Iterator[Taken]:
         """Return the steps from number `first` to `last`, in reverse order."""
         for place, end in zip(reversed(self._places), reversed(self._ends), strict=True):
@@ -122,30 +117,24 @@ class Retraced(ImplicitEngine):
                     self.resume_from(place.engine)
                     self._taken.clear()
                     self.advance(self._room, end - place.number)
-                low, high = (bisect_left(self._taken, k, key=_number) for k in (first, last))
+                numbers = [taken.number for taken in self._taken]
+                low, high = np.searchsorted(numbers, (first, last))
                 yield from reversed(self._taken[low:high])
 
     def changing(self) -> dict[str, Any]:
         """What the next steps depend on, without the engine's own counters."""
         return {name: part for name, part in super().changing().items() if name != "engine"}
 
-    def _reached(self, t: float) -> Reached:
-        old = self._scheme.old
-        return Reached(t, old.q.copy(), old.w.copy(), old.a.copy())
+    def _reached(self, t: float, at: StepEnd) -> Reached:
+        return Reached(t, at.q.copy(), at.w.copy(), at.a.copy())
 
     def _accept(self, h: float, end: float, jump: float | None) -> None:
-        new = self._scheme.new
         t = end if jump is None else math.nextafter(min(end, jump), -math.inf)
-        reached = Reached(t, new.q.copy(), new.w.copy(), new.a.copy())
-        number = int(self._state.tally.steps)
+        reached, number = self._reached(t, self.scheme.new), int(self._state.tally.steps)
         self._taken.append(Taken(number, h, self._at, reached, self._begins))
         super()._accept(h, end, jump)
-        self._at = reached if jump is None else self._reached(max(end, jump))
+        self._at = reached if jump is None else self._reached(max(end, jump), self.scheme.old)
         self._begins = jump is not None
-
-
-def _number(taken: Taken) -> int:
-    return taken.number
 
 
 class ImplicitAdjoint(Adjoint):
@@ -161,7 +150,8 @@ class ImplicitAdjoint(Adjoint):
     def __init__(self, motion: Any, steps: Retraced) -> None:
         super().__init__(motion)
         packed, self._steps = self._packed, steps
-        self._matrix, self._scheme = StepMatrix(packed, True), steps.scheme
+        self._matrix = StepMatrix(packed, True)
+        self._scheme: Any = steps.scheme  # one with `parameters`
         shape = self._scheme.shift.shape
         free = np.zeros(shape, bool)
         free.ravel()[self._matrix.free] = True

@@ -73,8 +73,6 @@ def inertia(mass: sparse.csr_array, fixed: NDArray, ties: Ties, hidden: NDArray)
     """
     rows = np.ones((-(-len(hidden) // 3), 3))  # padding has the inertia 1
     rows.ravel()[: len(hidden)] = hidden
-    mass = sparse.csr_array(mass)
-    mass.sort_indices()
     diagonal = mass.diagonal()
     lumped = is_lumped(mass) and not len(ties.slave)
     inverse, factor_of_axis, factors = np.zeros((0, 3)), np.zeros(3, np.int64), []
@@ -93,17 +91,9 @@ def inertia(mass: sparse.csr_array, fixed: NDArray, ties: Ties, hidden: NDArray)
         free = [np.flatnonzero(~held) for held in distinct.T]
         factors = [_factor(mass[nodes][:, nodes], nodes) for nodes in free]
     return Inertia(
-        lumped,
-        diagonal,
-        inverse,
-        mass.indptr.astype(np.int64),
-        mass.indices.astype(np.int64),
-        mass.data.astype(float),
-        rows,
-        ties,
-        factor_of_axis.ravel(),
-        *_join(factors),
-    )
+        lumped, diagonal, inverse, mass.indptr.astype(np.int64), mass.indices.astype(np.int64),
+        mass.data.astype(float), rows, ties, factor_of_axis.ravel(), *_join(factors),
+    )  # fmt: skip
 
 
 def lightness(mass: Inertia) -> NDArray:
@@ -132,9 +122,8 @@ def _join(factors: list[tuple]) -> tuple[NDArray, ...]:
     def column(parts: Iterable[NDArray], kind: type) -> NDArray:
         return np.concatenate([np.zeros(0, kind), *parts]).astype(kind)
 
-    nodes, rows, columns, lowers, uppers, pivots = (
-        zip(*factors, strict=True) if factors else 6 * [()]
-    )
+    parted = zip(*factors, strict=True) if factors else 6 * [()]
+    nodes, rows, columns, lowers, uppers, pivots = parted
     joined = [column(parts, np.int64) for parts in (nodes, rows, columns)]
     for triangles in (lowers, uppers):
         # each factor ends with a closing pointer, so columns of factor k start at start[k] + k

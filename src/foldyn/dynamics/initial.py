@@ -117,10 +117,9 @@ def check_start(case: Case, initial: State | None) -> tuple[NDArray, NDArray]:
             f"initial: got {type(initial).__name__}; give a State: fd.State(displacement=..., "
             "velocity=...) or fd.initial_state(result)"
         )
-    u, v = (
-        np.ascontiguousarray((initial or State()).of_nodes(name, case.structure.nodes.shape))
-        for name in ("displacement", "velocity")
-    )
+    begun, shape = initial or State(), case.structure.nodes.shape
+    u = np.ascontiguousarray(begun.of_nodes("displacement", shape))
+    v = np.ascontiguousarray(begun.of_nodes("velocity", shape))
     if (v[case.still] != 0.0).any():
         node = int(np.argwhere((v != 0.0) & case.still)[0][0])
         raise InputError(f"initial: velocity of node {node} is not zero along a supported axis")
@@ -144,17 +143,10 @@ def check_touching(case: Case, u: NDArray, start: float, end: float) -> None:
     except InputError:  # a failing function: the motion will stop there, with the reason
         return
     along, shapes = factors[len(obstacles) :], [shape for shape, _ in driven]
-    check_driven(
-        case,
-        (
-            (
-                f"t = {time:.6g} s",
-                sum((f * s for f, s in zip(along[:, k] - along[:, 0], shapes, strict=True)), u),
-                case.planes_moved(factors[: len(obstacles), k]),
-            )
-            for k, time in enumerate(times)
-        ),
-    )
+    steps = (along - along[:, :1]).T
+    moved = (sum((f * s for f, s in zip(step, shapes, strict=True)), u) for step in steps)
+    planes = map(case.planes_moved, factors[: len(obstacles)].T)
+    check_driven(case, zip((f"t = {time:.6g} s" for time in times), moved, planes, strict=True))
 
 
 def _check_tied_velocity(case: Case, velocity: NDArray) -> None:
@@ -333,10 +325,5 @@ def begin(
         there = by.inward(u)
         there.ravel()[body.hidden] = inward.ravel()[body.hidden]
         memory.start(there, remembered)
-    return MotionState(
-        u=inward,
-        v=moving,
-        carry=np.zeros_like(inward),
-        tally=tally,
-        angle=body.angles(by.inward(u)),
-    )
+    carry, angle = np.zeros_like(inward), body.angles(by.inward(u))
+    return MotionState(u=inward, v=moving, carry=carry, tally=tally, angle=angle)

@@ -260,11 +260,9 @@ class LinearMotion(InMemory):
     def _springs(self) -> list[tuple[int, sparse.csr_array]]:
         """Stiffness (m, m) at rest of each term that supports add, and the place of its energy."""
         body, groups = self.case.elastic_body, list(self.case.energy_groups)
-        return [
-            (groups.index(group), term.tangent(np.zeros(body.size)))
-            for term in body.others
-            for group in term.energy_groups
-        ]
+        named = [(group, term) for term in body.others for group in term.energy_groups]
+        rest = np.zeros(body.size)
+        return [(groups.index(group), term.tangent(rest)) for group, term in named]
 
     def _warn(self, out: Samples, missing: float) -> None:
         if missing > self._tolerance:

@@ -96,15 +96,8 @@ class Samples(NamedTuple):
 
 def samples(count: int, nodes: int, supported: int, energies: int, branches: int = 0) -> Samples:
     """Room for `count` samples."""
-    return Samples(
-        np.empty(count),
-        np.empty((count, nodes, 3)),
-        np.empty((count, nodes, 3)),
-        np.empty((count, supported)),
-        np.empty((count, energies)),
-        np.empty((count, branches, VARIABLES)),
-        0,
-    )
+    sizes = (), (nodes, 3), (nodes, 3), (supported,), (energies,), (branches, VARIABLES)
+    return Samples._make((*(np.empty((count, *size)) for size in sizes), 0))
 
 
 @inner_scalar

@@ -59,10 +59,9 @@ class Output:
         self._case, self._plan, self._sampler, self._branches = case, plan, sampler, branches
         self._keeping, self._air = keeping, case.air is not None
         self.names = audited(case.energy_groups, self._air)
-        at_once = 1  # largest number of samples in a step
+        self._at_once = 1  # largest number of samples in a step
         if not plan.steps and not plan.every:
-            at_once = math.floor(plan.dt / plan.interval) + 2
-        self._at_once = at_once
+            self._at_once = math.floor(plan.dt / plan.interval) + 2
         self.balance = EnergyBalance(self._air)
         self.window = self._room(0)
         sampler.clear()
@@ -159,10 +158,8 @@ class Output:
     def checkpoint_arrays(self) -> dict[str, NDArray]:
         """Statistics of the samples on disk, for `resume_from`."""
         own = self.balance
-        return {
-            "balance_start": own.start,
-            "balance": np.array([getattr(own, name) for name in EnergyBalance.NUMBERS]),
-        }
+        numbers = np.array([getattr(own, name) for name in EnergyBalance.NUMBERS])
+        return {"balance_start": own.start, "balance": numbers}
 
     def resume_from(self, arrays: Mapping[str, NDArray], count: int) -> None:
         """Continue after `count` samples on disk, with the statistics in `arrays`."""
@@ -189,10 +186,8 @@ class Output:
         most : number of samples, from the first to the last, at most.
         """
         picks = np.unique(np.linspace(0, stored - 1, min(most, stored)).astype(np.int64))
-        columns, out = self._on_disk(stored), self.written(stored)
-        found: Any = (out.displacement, out.velocity, out.energy)
-        if columns is not None:
-            found = columns["displacement"], columns["velocity"], columns["energy"]
+        there: Any = self._on_disk(stored) or self.written(stored)._asdict()
+        found = (there[name] for name in ("displacement", "velocity", "energy"))
         moved, moving, energy = (np.array([each[k] for k in picks.tolist()]) for each in found)
         return moved, moving, energy
 

@@ -127,19 +127,15 @@ def moving_power(m):
 @addressed()
 def turning_power(m):
     """Power (W) of changing rest angles."""
-    return power_of_part(
-        m.system.actuators, m.s.factor, m.fold_angle, m.s.turned[0],
-        m.s.turned[1],
-    )  # fmt: skip
+    first, last = m.s.turned[0], m.s.turned[1]
+    return power_of_part(m.system.actuators, m.s.factor, m.fold_angle, first, last)
 
 
 @addressed(NUMBER)
 def offsets(m, accepted):
     """Work (J) of offsets since the last step; see `actuation.offset_work`."""
-    return offset_work(
-        m.system.actuators, m.fold_angle, m.s.turned[0], m.s.turned[1],
-        accepted > 0.0,
-    )  # fmt: skip
+    first, last = m.s.turned[0], m.s.turned[1]
+    return offset_work(m.system.actuators, m.fold_angle, first, last, accepted > 0.0)
 
 
 @addressed(ADDRESS)

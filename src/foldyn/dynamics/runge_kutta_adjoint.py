@@ -82,9 +82,8 @@ def pull_steps(
     lumped, count = case.solve == 0, by_u.size
     y, product, rate = memory[0], memory[1], memory[2]
     yn, pn, rn, both = flat(y), flat(product), flat(rate), flat(memory[6])
-    ka, su, sv, lu, lv = (
-        flat(memory[3]), flat(memory[4]), flat(memory[5]), flat(by_u), flat(by_v)
-    )  # fmt: skip
+    ka, su, sv = flat(memory[3]), flat(memory[4]), flat(memory[5])
+    lu, lv = flat(by_u), flat(by_v)
     force, inverse = flat(scratch.force), flat(case.mass.inverse)
     for i in range(count):
         both[i] = 0.0
@@ -246,11 +245,9 @@ def segment(motion: Any) -> int:
     It is small enough for memory to hold all stages between two samples, as long as that many
     samples also fit.
     """
-    plan, rows = motion.plan, motion.packed.system.rows
+    every, rows = motion.plan.every, motion.packed.system.rows
     at_once = steps_at_once(len(motion.method.tableau.weights), rows)
-    most = max(at_once, int(plan.steps * 2 * 3 * 8 * rows / ROOM[1]))
-    parts = next(
-        k for k in range(1, plan.every + 1) if plan.every % k == 0 <= most - plan.every // k
-    )
-    shorter = plan.every // parts
-    return shorter if 4 * shorter > min(most, plan.every) else plan.every
+    most = max(at_once, int(motion.plan.steps * 2 * 3 * 8 * rows / ROOM[1]))
+    parts = next(k for k in range(1, every + 1) if every % k == 0 <= most - every // k)
+    shorter = every // parts
+    return shorter if 4 * shorter > min(most, every) else every

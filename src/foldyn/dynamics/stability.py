@@ -220,14 +220,12 @@ def _quotient_of(
 
 def _largest_eigenvalue(k: sparse.csr_array, m: sparse.csr_array) -> float:
     if k.shape[0] <= _DENSE:
-        values = eigh(k.toarray(), m.toarray(), eigvals_only=True)[-1]
-    elif is_lumped(m):
+        return float(eigh(k.toarray(), m.toarray(), eigvals_only=True)[-1])
+    if is_lumped(m):
         root = sparse.diags_array(1.0 / np.sqrt(m.diagonal()))
-        values = _largest(sparse.csr_array(root @ k @ root))
-    else:
-        solve = factorize(sparse.csc_array(m), symmetric=False).solve
-        values = _largest(k, m, linalg.LinearOperator(m.shape, matvec=solve, dtype=float))
-    return float(values)
+        return _largest(sparse.csr_array(root @ k @ root))
+    solve = factorize(sparse.csc_array(m), symmetric=False).solve
+    return _largest(k, m, linalg.LinearOperator(m.shape, matvec=solve, dtype=float))
 
 
 def _largest(

@@ -269,10 +269,8 @@ class Bases:
     def __init__(self, model: Matrices, place: NDArray, speed: NDArray, modes: int) -> None:
         self._model, ties = model, model.ties
         self._support = np.column_stack([model.support, place])
-        stiffness, mass = (
-            sparse.csc_array(ties.T @ one @ ties) for one in (model.stiffness, model.mass)
-        )
-        self._pencil = Pencil(stiffness, mass)
+        stiffness = sparse.csc_array(ties.T @ model.stiffness @ ties)
+        self._pencil = Pencil(stiffness, sparse.csc_array(ties.T @ model.mass @ ties))
         self.most = self._pencil.finite
         self._find(min(modes, self.most))
         rigid = self._values <= RIGID * np.abs(self._values).max()

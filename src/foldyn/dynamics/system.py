@@ -140,10 +140,8 @@ def pack(
     nodal = by.matrix(case.mass)
     ties = ties_of(case.constraints, by)
     mass = inertia(nodal, by.held(case.fixed), ties, hidden)
-    moves = [
-        (carry_supports(mass, by.inward(shape)), history)
-        for shape, history in (*case.imposed_terms, *case.base_terms)
-    ]
+    driven = (*case.imposed_terms, *case.base_terms)
+    moves = [(carry_supports(mass, by.inward(shape)), history) for shape, history in driven]
     loads = [(by.inward(vector), history) for vector, history in case.load_terms]
     parts = [(part, histories.index(history)) for part, history in case.following_terms]
     following = joined(parts).placed(by.rank)
@@ -190,14 +188,12 @@ def _driven(case: Case, histories: list[History], terms: Sequence[Any]) -> Assem
 
 
 def _entries(terms, histories) -> Entries:
-    dofs, values, rows = [np.zeros(0, np.int64)], [np.zeros(0)], [np.zeros(0, np.int64)]
+    parts = [(np.zeros(0, np.int64), np.zeros(0), np.zeros(0, np.int64))]
     for vector, history in terms:
         entries = np.ravel(vector)
         where = np.flatnonzero(entries)
-        dofs.append(where)
-        values.append(entries[where])
-        rows.append(np.full(len(where), histories.index(history)))
-    return Entries(*map(np.concatenate, (dofs, values, rows)))
+        parts.append((where, entries[where], np.full(len(where), histories.index(history))))
+    return Entries(*map(np.concatenate, zip(*parts, strict=True)))
 
 
 def _ordered(entries: Entries) -> Entries:

@@ -43,12 +43,8 @@ def ties_of(constraints: Constraints, by: Numbering) -> Ties:
         return Ties(nothing, empty, nothing, _rows(constraints.reactions, by))
     slaves, free = constraints.slaves, constraints.free
     only = sparse.csr_array(constraints.basis[slaves][:, free])
-    return Ties(
-        by.dofs(slaves),
-        Rows(only.indptr.astype(np.int64), by.dofs(free[only.indices]), only.data),
-        by.dofs(free),
-        _rows(constraints.reactions, by),
-    )
+    by_free = Rows(only.indptr.astype(np.int64), by.dofs(free[only.indices]), only.data)
+    return Ties(by.dofs(slaves), by_free, by.dofs(free), _rows(constraints.reactions, by))
 
 
 def _rows(matrix: sparse.csr_array, by: Numbering) -> Rows:

@@ -140,13 +140,11 @@ class Chain(NamedTuple):
                 own = derivative.frozen(self._subject(measure), self.case, **given)
                 frozen.append((share, own))
         if frozen:
-            total.explicit.update(
-                differenced(
-                    self.design,
-                    lambda case: {"": sum(share * own(case) for share, own in frozen)},
-                    SHORTER,
-                )[""]
-            )
+
+            def value(case: Case) -> dict[str, float]:
+                return {"": sum(share * own(case) for share, own in frozen)}
+
+            total.explicit.update(differenced(self.design, value, SHORTER)[""])
         return total
 
     def _by_parameters(self, changes: _Changes) -> dict[str, NDArray]:
@@ -155,10 +153,8 @@ class Chain(NamedTuple):
         gradient = dict(self.found.backward(seeds)) if seeds else self._nothing
         for key, by in changes.numbers.items():
             _add(gradient, key, by, 1.0)
-        return {
-            name: slope.pulled(gradient) + changes.explicit.get(name, 0.0)
-            for name, slope in self.slopes.items()
-        }
+        more, slopes = changes.explicit, self.slopes.items()
+        return {name: slope.pulled(gradient) + more.get(name, 0.0) for name, slope in slopes}
 
     @property
     def _nothing(self) -> dict[str, NDArray]:

@@ -73,10 +73,8 @@ class Expression:
         return found.value, dict(zip(self.measures, found.slope.tolist(), strict=True))
 
     def _at(self, values: Mapping[str, float], slopes: NDArray) -> _Number:
-        known = {
-            name: _Number(float(values[name]), slope)
-            for name, slope in zip(self.measures, slopes, strict=True)
-        }
+        pairs = zip(self.measures, slopes, strict=True)
+        known = {name: _Number(float(values[name]), slope) for name, slope in pairs}
         with np.errstate(all="ignore"):
             found = _worked(self.tree, known, slopes.shape[1])
         if not math.isfinite(found.value) or not np.isfinite(found.slope).all():
@@ -97,15 +95,15 @@ def parse(text: str) -> Expression:
     InputError
         The text cannot be read, or contains anything else; the message quotes text and place.
     """
-    if not isinstance(text, str) or not text.strip():
-        raise InputError(f" = {show(text)}: must be an expression of measures; {EXAMPLE}")
-    tree = _read(text, EXAMPLE)
+    tree = _read(text, "an expression of measures", EXAMPLE)
     if isinstance(tree, ast.Compare):
         _refuse(text, tree, "is a comparison; one belongs in subject_to, an expression here")
     return _expression(text.strip(), tree, text)
 
 
-def _read(text: str, example: str) -> ast.expr:
+def _read(text: str, what: str, example: str) -> ast.expr:
+    if not isinstance(text, str) or not text.strip():
+        raise InputError(f" = {show(text)}: must be {what}; {example}")
     try:
         return trees.parse(text.strip())
     except InputError as error:
@@ -283,9 +281,8 @@ class Constraint:
 
     def value_and_slopes(self, values: Mapping[str, float]) -> tuple[float, dict[str, float]]:
         """`value`, and its derivatives with respect to all measures."""
-        (left, slopes), (right, others) = (
-            side.value_and_slopes(values) for side in (self.left, self.right)
-        )
+        left, slopes = self.left.value_and_slopes(values)
+        right, others = self.right.value_and_slopes(values)
         return left - right, {n: slopes.get(n, 0.0) - others.get(n, 0.0) for n in self.measures}
 
     def size(self, values: Mapping[str, float]) -> float:
@@ -297,9 +294,9 @@ class Constraint:
 
     def violation(self, difference: float) -> float:
         """Violation for a difference of the two sides; 0 if the constraint is satisfied."""
-        return {"==": abs(difference), "<=": max(difference, 0.0), ">=": max(-difference, 0.0)}[
-            self.sense
-        ]
+        if self.sense == "==":
+            return abs(difference)
+        return max(difference if self.sense == "<=" else -difference, 0.0)
 
 
 def constraint(text: str) -> Constraint:
@@ -311,9 +308,7 @@ def constraint(text: str) -> Constraint:
         The text cannot be read, or is not a constraint.
     """
     example = 'write for example "frequency[1] == 12" or "mass <= 0.1"'
-    if not isinstance(text, str) or not text.strip():
-        raise InputError(f" = {show(text)}: must be a constraint; {example}")
-    tree = _read(text, example)
+    tree = _read(text, "a constraint", example)
     if not isinstance(tree, ast.Compare):
         raise InputError(f" = {show(text)}: compares nothing; {example}")
     if len(tree.ops) != 1:

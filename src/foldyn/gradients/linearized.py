@@ -51,13 +51,12 @@ class Products:
         self, linear: Linearized, equilibrium: bool, displacement: NDArray | None = None
     ) -> None:
         self._linear, self._case = linear, linear.case
-        case = linear.case
         body, self._factor = linear.case.body, float(equilibrium)
         self.q = body.dofs(linear.displacement if displacement is None else displacement)
         moving = None if equilibrium else body.hidden
         self._balance = Balance(linear.case, self.q, moving)
         # the stiffness of a linear model does not depend on the state
-        self._moves = not case.structure.linear and (equilibrium or len(body.hidden) > 0)
+        self._moves = not linear.case.structure.linear and (equilibrium or len(body.hidden) > 0)
         at_rest = soft_at_rest(linear.case, body, self.q)[0]
         self._sheet = body.sheet.weakened(at_rest) if at_rest.any() else body.sheet
         self._soft = at_rest.any() and self._sheet.folds.stiffness != body.sheet.folds.stiffness

@@ -343,9 +343,8 @@ def _greatest(
 
 def _least_margin(found: xr.Dataset, case: Case) -> list[Callable[[xr.Dataset], float]]:
     own = np.nan_to_num(margins(found)["panel_margin"].values, nan=np.inf)
-    return [
-        lambda near, at=at: float(margins(near)["panel_margin"].values[at]) for at in _largest(-own)
-    ]
+    least = _largest(-own)
+    return [lambda near, at=at: float(margins(near)["panel_margin"].values[at]) for at in least]
 
 
 # ------------------------------------------------------------------ frequency responses

@@ -192,20 +192,17 @@ def modes(found: Found, others: Sequence[Asked], wanted: Sequence[int]) -> list[
     """Modes of other cases, near those modes of `found` that have the numbers `wanted`."""
     linear, result = found.linear, found.result
     beside = [linear if each.case is linear.case else _linear(each) for each in others]
-    frequency, eigenvalue, ratio = (
-        [result[name].values.copy() for _ in others]
-        for name in ("frequency", "eigenvalue", "damping_ratio")
-    )
+    frequency = [result["frequency"].values.copy() for _ in others]
+    eigenvalue = [result["eigenvalue"].values.copy() for _ in others]
+    ratio = [result["damping_ratio"].values.copy() for _ in others]
     seen = result["shape"].transpose("mode", "node", "axis").values
     shapes = [seen.copy() for _ in others]
     assert not isinstance(linear.mass, Squared)  # large sheets in air have no gradients
     for k in wanted:
         value = float(result["eigenvalue"].values[k])
         matrix = linear.stiffness - value * linear.mass
-        carried = linear.mass @ _on_free(linear, seen[k].ravel())
-        bordered = sparse.block_array(
-            [[matrix, -carried[:, None]], [-carried[None], None]], format="csc"
-        )
+        carried = (linear.mass @ _on_free(linear, seen[k].ravel()))[:, None]
+        bordered = sparse.block_array([[matrix, -carried], [-carried.T, None]], format="csc")
         factored = factorize(bordered, pivot=PIVOT)
         full = factored.solve(np.append(np.zeros(len(carried)), -1.0))[:-1]  # includes hidden dofs
         full /= np.sqrt(full @ (linear.mass @ full))
@@ -272,9 +269,8 @@ def responses(one: Asked, others: Sequence[Asked]) -> list[xarray.Dataset]:
     else:
         known = {each.name for each in fields(HarmonicBalance)}
         given = {name: value for name, value in one.arguments.items() if name in known}
-        answer = harmonic(
-            cases[0].linear, cases[0].drive, hertz, HarmonicBalance(**given), lambda _: None
-        )
+        first, balance = cases[0], HarmonicBalance(**given)
+        answer = harmonic(first.linear, first.drive, hertz, balance, lambda _: None)
         found = _harmonic(cases, TURN * hertz, answer.response)
     named = {"frequency": hertz}
     return [
@@ -295,9 +291,8 @@ def _direct(cases: Sequence[_Driven], omegas: NDArray) -> NDArray[np.complex128]
         x, factors = solved(stiffness, load, linear.gram, 1j * omega)
         if factors is not None:
             found[0, k] = x
-            found[1:, k] = _repeated(
-                x, len(beside), partial(_left, beside, matrices, omega), factors
-            )
+            left = partial(_left, beside, matrices, omega)
+            found[1:, k] = _repeated(x, len(beside), left, factors)
     return found
 
 

@@ -334,9 +334,8 @@ def _kinked(
     The arguments after `here` are changes of the numbers, one and two steps ahead and behind.
     """
     bent, far = np.abs(ahead + behind), np.abs(far_ahead + far_behind)
-    least = max(
-        1e-3 * np.abs(ahead - behind).max(initial=0.0), 1e-8 * np.abs(here).max(initial=0.0)
-    )
+    rise = np.abs(ahead - behind).max(initial=0.0)
+    least = max(1e-3 * rise, 1e-8 * np.abs(here).max(initial=0.0))
     return bool(((bent > least) & (far < 3.0 * bent)).any())
 
 

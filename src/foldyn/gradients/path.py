@@ -208,10 +208,9 @@ class PathGradient(Differentiated):
     ) -> None:
         """Add the derivatives of a load factor, df = -w' R_p dp / (w' R_f), times a seed."""
         case, q = self.case, self.case.body.dofs(moved.displacement)
-        growing, motion = (
-            sum((vector for vector, _ in terms), np.zeros_like(moved.displacement))
-            for terms in (case.load_terms, case.imposed_terms)
-        )
+        still = np.zeros_like(moved.displacement)
+        growing = sum((vector for vector, _ in case.load_terms), still)
+        motion = sum((vector for vector, _ in case.imposed_terms), still)
         rate = case.body.tangent(q)[:, : motion.size] @ motion.ravel()
         rate[: growing.size] -= growing.ravel()
         along = float(weight @ rate)

@@ -243,12 +243,9 @@ def _by_lengths(areas: Slope, numbers: Gradient) -> Slope:
     """
     name = next(key for key in numbers if key.endswith("bar_stiffness"))
     prefix = name.removesuffix("bar_stiffness")
-    length = numbers[f"{prefix}bar_per_length2"] ** -0.5
-    by = {
-        name: -numbers[name] / length,
-        f"{prefix}bar_per_length2": -2.0 / length**3,
-        f"{prefix}bar_excess": -2.0 / length,
-    }
+    inverse, excess = f"{prefix}bar_per_length2", f"{prefix}bar_excess"
+    length = numbers[inverse] ** -0.5
+    by = {name: -numbers[name] / length, inverse: -2.0 / length**3, excess: -2.0 / length}
     own = areas.by[name].astype(bool)
     return Slope({key: sparse.diags_array(each) @ own for key, each in by.items()}, areas.count)
 

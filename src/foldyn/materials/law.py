@@ -159,9 +159,8 @@ class HingeLaw(Law):
 
     def _rows(self, compiled: Callable[..., NDArray], theta: ArrayLike, rest: ArrayLike) -> NDArray:
         # copies: read-only arrays would compile the table again
-        theta, rest = (
-            np.array(each, float, order="C") for each in np.broadcast_arrays(theta, rest)
-        )
+        both = np.broadcast_arrays(theta, rest)
+        theta, rest = (np.array(each, float, order="C") for each in both)
         address = np.array(self.addresses or (0, 0, 0), np.int64)
         parameters = np.ascontiguousarray(self.parameters(rest.ravel()))
         flat = compiled(self.code, theta.ravel(), rest.ravel(), parameters, address)

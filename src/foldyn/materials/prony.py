@@ -158,10 +158,8 @@ class CreaseDampers(MemoryLaw):
 
 def maxwell(ratio: NDArray, rate: NDArray) -> tuple[Branch, ...]:
     """Maxwell branches of n hinges with stiffness ratios (n, b) and rates (n, b), 1/s."""
-    return tuple(
-        Branch(CODE, columns(len(g), g, each), 0.0, g, each)
-        for g, each in zip(ratio.T, rate.T, strict=True)
-    )
+    pairs = zip(ratio.T, rate.T, strict=True)
+    return tuple(Branch(CODE, columns(len(g), g, each), 0.0, g, each) for g, each in pairs)
 
 
 def in_series(

@@ -238,10 +238,8 @@ class Assembly:
     def _parts(self, threads: int) -> list[ThreadPart]:
         """The parts of `thread_parts`, without the memory of terms."""
         alone = not all(term.shared for term in self.terms)
-        found = [
-            ThreadPart(own.team, own.own, own.angle, own.fold_angle, own)
-            for own in self.sheet.scratches(1 if alone else threads)
-        ]
+        scratches = self.sheet.scratches(1 if alone else threads)
+        found = [ThreadPart(s.team, s.own, s.angle, s.fold_angle, s) for s in scratches]
         count = sum(len(term.hinges) for term in self.others)
         if not count:
             return found

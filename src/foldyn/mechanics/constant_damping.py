@@ -108,8 +108,7 @@ class DampingMatrix(Term):
     def compiled(self, part: Any, kept: Any, group: int) -> CompiledTerm:
         """Context and kernels for a thread; see `Term`."""
         start, column = self.matrix.indptr.astype(np.int64), self.matrix.indices.astype(np.int64)
-        rows = np.asarray(part.own)
-        own = _Matrix(start, column, self.matrix.data, rows, part.team)
+        own = _Matrix(start, column, self.matrix.data, np.asarray(part.own), part.team)
         return CompiledTerm(Context(own), {FORCES: _of_matrix})
 
     def arrays(self) -> Arrays:

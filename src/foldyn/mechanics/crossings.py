@@ -200,9 +200,8 @@ def _grid(boxes: Boxes) -> Grid:
     while np.prod(span / cell + 1.0) > most:
         cell *= 1.25
     shape = (span / cell).astype(np.int64) + 1
-    lower, upper = (
-        np.minimum(((x - origin) / cell).astype(np.int64), shape - 1) for x in (low, high)
-    )
+    lower = np.minimum(((low - origin) / cell).astype(np.int64), shape - 1)
+    upper = np.minimum(((high - origin) / cell).astype(np.int64), shape - 1)
     many = upper - lower + 1
     each = many.prod(axis=1)
     # cells of each box in turn, with the last axis fastest

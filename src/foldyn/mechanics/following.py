@@ -69,11 +69,9 @@ class Following(NamedTuple):
 
     def placed(self, rank: NDArray) -> Following:
         """Copy for nodes that are stored at the places rank (n,)."""
-        return self._replace(
-            triangles=_whole(rank[self.triangles]),
-            hinges=_whole(np.append(rank, -1)[self.hinges]),
-            bars=_whole(rank[self.bars]),
-        )
+        triangles, bars = _whole(rank[self.triangles]), _whole(rank[self.bars])
+        hinges = _whole(np.append(rank, -1)[self.hinges])
+        return self._replace(triangles=triangles, hinges=hinges, bars=bars)
 
 
 def pressures(x: NDArray, triangles: NDArray, pressure: NDArray) -> Following:
@@ -117,10 +115,8 @@ def joined(parts: Iterable[tuple[Following, int]]) -> Following:
     """All entries of several parts, each given with the row of its history."""
     numbered = [Following()]
     for part, row in parts:
-        rows = {
-            name: np.full_like(getattr(part, name), row)
-            for name in ("pressure_row", "moment_row", "tension_row", "push_row")
-        }
+        names = "pressure_row", "moment_row", "tension_row", "push_row"
+        rows = {name: np.full_like(getattr(part, name), row) for name in names}
         numbered.append(part._replace(**rows))
     return Following(*map(np.concatenate, zip(*numbered, strict=True)))
 

@@ -62,10 +62,8 @@ def force_scratches(model: BarsHinges, threads: int) -> list[ForceScratch]:
     """Scratch of each thread; fewer threads than requested if the model has too few parts."""
     parts = strips(model, threads)
     angle = np.empty(len(model.hinges))
-    return [
-        ForceScratch._make([*_aligned(part.rows), angle, angle, part, member])
-        for part, member in zip(parts, team(len(parts)), strict=True)
-    ]
+    each = zip(parts, team(len(parts)), strict=True)
+    return [ForceScratch._make([*_aligned(own.rows), angle, angle, own, one]) for own, one in each]
 
 
 def _aligned(rows: int) -> list[NDArray]:

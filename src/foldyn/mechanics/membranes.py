@@ -322,12 +322,9 @@ class Back(NamedTuple):
 
     def of(self, membranes: Membranes) -> dict[str, NDArray]:
         """The gradients with the shapes of the arrays of panels, by name."""
-        return {
-            name: rows.reshape(*getattr(membranes, name).shape[:-1], -1)[
-                ..., : len(membranes.nodes)
-            ]
-            for name, rows in self._asdict().items()
-        }
+        count, fields = len(membranes.nodes), self._asdict().items()
+        shapes = {name: getattr(membranes, name).shape[:-1] for name, _ in fields}
+        return {name: rows.reshape(*shapes[name], -1)[..., :count] for name, rows in fields}
 
 
 def back(membranes: Membranes) -> Back:
@@ -335,9 +332,8 @@ def back(membranes: Membranes) -> Back:
     count, bars = len(membranes.nodes), len(membranes.ends)
     # an odd number of groups: otherwise rows may compete for the same cache lines
     room = WIDTH * (-(-count // WIDTH) | 1)
-    return Back(
-        *(np.zeros((rows, room)) for rows in (3 * bars, bars, len(membranes.stiffness) ** 2))
-    )
+    sizes = 3 * bars, bars, len(membranes.stiffness) ** 2
+    return Back(*(np.zeros((rows, room)) for rows in sizes))
 
 
 @inner_scalar

@@ -60,10 +60,9 @@ class _Backward(NamedTuple):
 
 @pullback
 def _pullback(own, u, v, t, weight, product, rate):
-    moved, weights, out = (
-        rows_at(u, own.rows), rows_at(weight, own.rows), rows_at(product, own.rows)
-    )  # fmt: skip
-    pull_membranes(own.own, own.back, flat(moved), flat(weights), own.rows, flat(out))
+    moved, weights = flat(rows_at(u, own.rows)), flat(rows_at(weight, own.rows))
+    out = flat(rows_at(product, own.rows))
+    pull_membranes(own.own, own.back, moved, weights, own.rows, out)
 
 
 class _Context(NamedTuple):
@@ -188,10 +187,8 @@ class MembranesTerm(Term):
         size, places = (q.size, q.size), np.array(self.places)
         entries = self._entries(q, q, np.zeros(self.membranes.stiffness.shape[1:]))
         alone = np.isin(places, self.membranes.gives).all(axis=0)
-        tangent, kept = (
-            sparse.csr_array((entries[own], tuple(places[:, own])), size)
-            for own in (slice(None), alone)
-        )
+        tangent = sparse.csr_array((entries, tuple(places)), size)
+        kept = sparse.csr_array((entries[alone], tuple(places[:, alone])), size)
         return Unstrained(tangent, kept, lambda motion: 0.0)
 
     def strains(self, others: Strains) -> Strains:

@@ -56,16 +56,11 @@ class PlatesPattern(NamedTuple):
 def plates_pattern(model: BarsPlates, bars: tuple[NDArray, NDArray]) -> PlatesPattern:
     """Pattern of the tangent, given the pattern of the bars' blocks: indptr and indices."""
     n, count = model.nodes, model.nodes + model.rotations
-    hinges, folds, elements = model.hinges, len(model.fold_rest), len(model.fold_rest)
-    elements += len(model.start) - 1
+    hinges, folds, plates = model.hinges, len(model.fold_rest), len(model.start) - 1
+    elements = folds + plates
     beside, side = np.nonzero(model.fold_rotations >= 0)
-    of = np.concatenate(  # the element of each angle
-        [
-            np.arange(folds),
-            beside,
-            folds + np.repeat(np.arange(elements - folds), np.diff(model.start)),
-        ]
-    )
+    plate = np.repeat(np.arange(plates), np.diff(model.start))
+    of = np.concatenate([np.arange(folds), beside, folds + plate])  # the element of each angle
     turns = -1 - model.fold_rotations[beside, side]
     angle = np.concatenate([np.arange(folds), turns, model.angle])
     order = np.argsort(of, kind="stable")

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 
 from foldyn.jit.compiled import kernel
-from foldyn.mechanics.tangent import distinct
+from foldyn.mechanics.tangent import block_keys, distinct
 
 
 class Slots:
@@ -37,8 +37,7 @@ class Slots:
     def _find(self, indices: NDArray, indptr: NDArray) -> tuple[NDArray, ...]:
         """Pattern of the sum, and the slots of the matrix's entries and of added entries in it."""
         size = len(indptr) - 1
-        own = np.repeat(np.arange(size), np.diff(indptr)) * size + indices
-        new = self._row * size + self._column
+        own, new = block_keys(indptr, indices), self._row * size + self._column
         both = distinct(np.concatenate([own, new]))
         row, column = np.divmod(both, size)
         ends = np.searchsorted(row, np.arange(size + 1))

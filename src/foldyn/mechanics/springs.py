@@ -96,10 +96,8 @@ class _Backward(NamedTuple):
 
 @pullback
 def _pullback(own, u, v, t, weight, product, rate):
-    springs, out = own.springs, own.out
-    moved, weights, added = (
-        rows_at(u, own.rows), rows_at(weight, own.rows), rows_at(product, own.rows)
-    )  # fmt: skip
+    springs, out, added = own.springs, own.out, rows_at(product, own.rows)
+    moved, weights = rows_at(u, own.rows), rows_at(weight, own.rows)
     for s in range(springs.stiffness.size):
         a, b, k = springs.ends[s, 0], springs.ends[s, 1], springs.stiffness[s]
         extension = directed_extension(springs, moved, s)
@@ -216,9 +214,8 @@ class SpringsTerm(Term):
         own = Context(_Context(self.springs, group, int(part.own[1]), len(self.histories)))
         kernels = {FORCES: _forces, ENERGIES: _energies, MEAN_FORCES: _mean_forces}
         kernels |= {LIMIT: _limit} if self.springs.lines.slack.any() else {}
-        return CompiledTerm(
-            own, kernels | ({PLACE_OBSTACLES: drive_springs} if self.histories else {})
-        )
+        kernels |= {PLACE_OBSTACLES: drive_springs} if self.histories else {}
+        return CompiledTerm(own, kernels)
 
     def arrays(self) -> Arrays:
         """See `Term`."""

@@ -54,12 +54,10 @@ def sparsity(model: BarsHinges) -> Sparsity:
     blocks, inverse = np.unique(np.concatenate(keys), return_inverse=True)
     nb = len(model.bars)
     slots = inverse[n:]
-    return Sparsity(
-        np.searchsorted(blocks // n, np.arange(n + 1)).astype(np.int32),
-        (blocks % n).astype(np.int32),
-        np.ascontiguousarray(slots[: 4 * nb].reshape(-1, 2, 2)),
-        np.ascontiguousarray(slots[4 * nb :].reshape(-1, 4, 4)),
-    )
+    indptr = np.searchsorted(blocks // n, np.arange(n + 1)).astype(np.int32)
+    bars, hinges = slots[: 4 * nb].reshape(-1, 2, 2), slots[4 * nb :].reshape(-1, 4, 4)
+    indices = (blocks % n).astype(np.int32)
+    return Sparsity(indptr, indices, np.ascontiguousarray(bars), np.ascontiguousarray(hinges))
 
 
 def joined(pattern: Sparsity, more: NDArray) -> Sparsity:
@@ -67,12 +65,9 @@ def joined(pattern: Sparsity, more: NDArray) -> Sparsity:
     rows, own = len(pattern.indptr) - 1, block_keys(pattern.indptr, pattern.indices)
     both = distinct(np.concatenate([own, more]))
     moved = np.searchsorted(both, own)
-    return Sparsity(
-        np.searchsorted(both // rows, np.arange(rows + 1)).astype(np.int32),
-        (both % rows).astype(np.int32),
-        moved[pattern.bar_slots],
-        moved[pattern.hinge_slots],
-    )
+    indptr = np.searchsorted(both // rows, np.arange(rows + 1)).astype(np.int32)
+    indices = (both % rows).astype(np.int32)
+    return Sparsity(indptr, indices, moved[pattern.bar_slots], moved[pattern.hinge_slots])
 
 
 @inner_scalar

@@ -42,15 +42,9 @@ class Viscous(NamedTuple):
 
 
 def viscous(
-    pairs: NDArray,
-    axial: NDArray,
-    axial_coefficient: NDArray,
-    hinges: NDArray,
-    corners: NDArray,
-    hidden: NDArray,
-    hidden_turn: NDArray,
-    hinge_coefficient: NDArray,
-) -> Viscous:
+    pairs: NDArray, axial: NDArray, axial_coefficient: NDArray, hinges: NDArray, corners: NDArray,
+    hidden: NDArray, hidden_turn: NDArray, hinge_coefficient: NDArray,
+) -> Viscous:  # fmt: skip
     """Pack elements.
 
     Parameters
@@ -167,9 +161,8 @@ class _Context(NamedTuple):
 @forces
 def _forces(own, u, v, t, force, powers):
     elements, g, power = own.elements, own.elements.gradient, 0.0
-    moved, speed, out = (
-        numbers_at(u, own.size), numbers_at(v, own.size), numbers_at(force, own.size)
-    )  # fmt: skip
+    moved, speed = numbers_at(u, own.size), numbers_at(v, own.size)
+    out = numbers_at(force, own.size)
     for e in range(elements.coefficient.size):
         element_gradient(elements, moved, e, g)
         rate = 0.0
@@ -232,14 +225,9 @@ def _turn_gradient(elements, moved, e, z, points, out):
 def _pullback(own, u, v, t, weight, product, rate):
     """Of w . F = c (g . w) (g . v), d/dx is c times the rate of g along (g.w) v + (g.v) w."""
     elements, g, z, by, out = own.elements, own.elements.gradient, own.moves, own.by, own.out
-    moved, speed, weights = (
-        numbers_at(u, own.size), numbers_at(v, own.size), numbers_at(weight, own.size)
-    )  # fmt: skip
-    by_u, by_v, p = (
-        numbers_at(product, own.size),
-        numbers_at(rate, own.size),
-        own.out.axial.shape[0],
-    )
+    moved, speed = numbers_at(u, own.size), numbers_at(v, own.size)
+    weights, p = numbers_at(weight, own.size), own.out.axial.shape[0]
+    by_u, by_v = numbers_at(product, own.size), numbers_at(rate, own.size)
     for e in range(elements.coefficient.size):
         dofs, coefficient = elements.dofs[e], elements.coefficient[e]
         element_gradient(elements, moved, e, g)

@@ -99,10 +99,9 @@ def _pull(own, u, v, weight, product, rate):
 
 @pullback
 def _pullback(own, u, v, t, weight, product, rate):
-    moved, speed, weights = (
-        rows_at(u, own.rows), rows_at(v, own.rows), rows_at(weight, own.rows)
-    )  # fmt: skip
-    out, by_speed = rows_at(product, own.rows), rows_at(rate, own.rows)
+    moved, speed = rows_at(u, own.rows), rows_at(v, own.rows)
+    weights, out = rows_at(weight, own.rows), rows_at(product, own.rows)
+    by_speed = rows_at(rate, own.rows)
     _pull(own, flat(moved), flat(speed), flat(weights), flat(out), flat(by_speed))
 
 

@@ -34,9 +34,9 @@ def check_variable(
     if found is not None and found.dims == dims and found.dtype.kind in kind:
         return ds[name]
     over = f" over {', '.join(dims)}" if dims else ""
-    has = (
-        "lacks it" if found is None else f"has {found.dtype} over {', '.join(map(str, found.dims))}"
-    )
+    has = "lacks it"
+    if found is not None:
+        has = f"has {found.dtype} over {', '.join(map(str, found.dims))}"
     raise InputError(
         f"{place}the result's variable {name} must be {_KINDS[kind]}{over}; it {has}: it is "
         "damaged, or was changed"

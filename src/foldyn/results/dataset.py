@@ -28,18 +28,13 @@ TAKEN = frozenset(
 
 
 def trajectory_dataset(
-    case: Case,
-    time: ArrayLike,
-    displacement: ArrayLike,
-    velocity: ArrayLike,
-    reaction: ArrayLike,
-    energies: Mapping[str, ArrayLike],
-    statistics: Mapping[str, Any],
+    case: Case, time: ArrayLike, displacement: ArrayLike, velocity: ArrayLike,
+    reaction: ArrayLike, energies: Mapping[str, ArrayLike], statistics: Mapping[str, Any],
     sampled: Mapping[str, tuple[Quantity, ArrayLike]] | None = None,
     memory: ArrayLike | None = None,
     continuations: Mapping[str, tuple[float, Continuation]] | None = None,
     origin: tuple[float, Origin] | None = None,
-) -> xr.Dataset:
+) -> xr.Dataset:  # fmt: skip
     """Dataset of a motion, including its case.
 
     Parameters
@@ -107,15 +102,10 @@ def origin_variables(origin: Origin, time: float = math.nan) -> dict[str, Any]:
 
 
 def path_dataset(
-    case: Case,
-    load_factor: ArrayLike,
-    displacement: ArrayLike,
-    reaction: ArrayLike,
-    energies: Mapping[str, ArrayLike],
-    solution: Mapping[str, ArrayLike],
-    statistics: Mapping[str, Any],
-    obstacles: tuple[str, ...] = (),
-) -> xr.Dataset:
+    case: Case, load_factor: ArrayLike, displacement: ArrayLike, reaction: ArrayLike,
+    energies: Mapping[str, ArrayLike], solution: Mapping[str, ArrayLike],
+    statistics: Mapping[str, Any], obstacles: tuple[str, ...] = (),
+) -> xr.Dataset:  # fmt: skip
     """Dataset of a sequence of equilibria, including its case.
 
     Parameters
@@ -218,15 +208,9 @@ def _numbered(modes: ArrayLike, text: str = "mode") -> dict[str, Any]:
 
 
 def frf_dataset(
-    case: Case,
-    frequency: ArrayLike,
-    quantity: str,
-    response: ArrayLike,
-    displacement: ArrayLike,
-    drive: ArrayLike,
-    statistics: Mapping[str, Any],
-    more: Mapping[str, ArrayLike] | None = None,
-) -> xr.Dataset:
+    case: Case, frequency: ArrayLike, quantity: str, response: ArrayLike, displacement: ArrayLike,
+    drive: ArrayLike, statistics: Mapping[str, Any], more: Mapping[str, ArrayLike] | None = None,
+) -> xr.Dataset:  # fmt: skip
     """Dataset of a frequency response, including its case.
 
     Parameters
@@ -310,11 +294,9 @@ def random_dataset(
 
 
 def fidelity_dataset(
-    case: Case,
-    models: Sequence[str],
-    values: Mapping[str, ArrayLike],
+    case: Case, models: Sequence[str], values: Mapping[str, ArrayLike],
     statistics: Mapping[str, Any],
-) -> xr.Dataset:
+) -> xr.Dataset:  # fmt: skip
     """Dataset of a comparison of models with superelements or the shell, including its case.
 
     Parameters
@@ -335,11 +317,9 @@ def fidelity_dataset(
 
 
 def folding_dataset(
-    pattern: Pattern,
-    share: ArrayLike,
-    values: Mapping[str, ArrayLike],
+    pattern: Pattern, share: ArrayLike, values: Mapping[str, ArrayLike],
     statistics: Mapping[str, Any],
-) -> xr.Dataset:
+) -> xr.Dataset:  # fmt: skip
     """Dataset of the states of a folding pattern, including the pattern.
 
     Parameters
@@ -373,14 +353,10 @@ def folding_dataset(
 
 
 def result_dataset(
-    kind: str,
-    case: Case,
-    data: Mapping[str, Any],
-    along: Mapping[str, Any],
-    statistics: Mapping[str, Any],
-    times: NDArray[np.float64] | None = None,
+    kind: str, case: Case, data: Mapping[str, Any], along: Mapping[str, Any],
+    statistics: Mapping[str, Any], times: NDArray[np.float64] | None = None,
     obstacles: tuple[str, ...] = (),
-) -> xr.Dataset:
+) -> xr.Dataset:  # fmt: skip
     """Dataset of a result: variables, the case, and facts about the run.
 
     Parameters

@@ -10,6 +10,7 @@ from scipy import sparse
 from foldyn.errors import InputError
 from foldyn.patterns.screw import closest_rotations
 from foldyn.results.contents import case_of
+from foldyn.results.quantities import variable
 from foldyn.values import whole
 
 NEARLY_0 = 1e-9  # angles (rad) below this have no axis of their own
@@ -84,13 +85,8 @@ def attitude(result: xr.Dataset, panel: int | None = None) -> xr.Dataset:
             "momentum": (weight.sum() * mean, "kg m/s", "momentum"),
             "angular_momentum": (carried, "kg m2/s", "angular momentum about the center of mass"),
         }
-    return xr.Dataset(
-        {
-            name: (("time", "axis"), values, {"units": units, "long_name": text})
-            for name, (values, units, text) in found.items()
-        },
-        {"time": result["time"], "axis": result["axis"]},
-    )
+    data = {name: variable(("time", "axis"), *own) for name, own in found.items()}
+    return xr.Dataset(data, {"time": result["time"], "axis": result["axis"]})
 
 
 def _about_mean(vectors: NDArray, share: NDArray) -> tuple[NDArray, NDArray]:

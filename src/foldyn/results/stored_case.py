@@ -32,10 +32,8 @@ def case_variables(document: Document) -> dict[str, Any]:
     rest = arrays.pop("rest_position")
     lines = (f'{name} = "{_written(array)}"\n' for name, array in arrays.items())
     text = "".join([tomli_w.dumps(document.sections), _ARRAYS, *lines])
-    return {
-        "case": ((), text, {"long_name": "the case (TOML)"}),
-        "rest_position": (PLACE, rest, {"units": "m"}),
-    }
+    told = {"long_name": "the case (TOML)"}
+    return {"case": ((), text, told), "rest_position": (PLACE, rest, {"units": "m"})}
 
 
 def sections_of(ds: xr.Dataset) -> str:

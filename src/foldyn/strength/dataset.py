@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from foldyn.cases import Case
 from foldyn.results.dataset import result_dataset
-from foldyn.results.quantities import STRESSES, variable
+from foldyn.results.quantities import STRESSES, variables
 from foldyn.shells.recovery import StressPoints
 from foldyn.strength.resultants import without_rigid
 
@@ -75,12 +75,7 @@ def stress_dataset(
         if not np.iscomplexobj(stress):
             values["principal_stress"] = principal(stress)
         coordinates |= point_coordinates(points)
-    data = {
-        name: variable(
-            (first, *STRESSES[name].dims), own, STRESSES[name].units, STRESSES[name].text
-        )
-        for name, own in values.items()
-    }
+    data = variables(STRESSES, first, values)
     coordinates["crease_vertices"] = (("crease", "end"), case.structure.pattern.creases)
     return result_dataset("stresses", case, data, coordinates, statistics)
 

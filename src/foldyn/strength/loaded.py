@@ -92,9 +92,8 @@ def crease_moments(structure: Discretized, body: Assembly, q: NDArray) -> NDArra
         return (structure.fold_stiffness * at_rest + structure.slope * turned) / length
     x = structure.nodes + q[: structure.nodes.size].reshape(-1, 3)
     corners = np.arange(hinges.corners.size // 3).reshape(-1, 4)
-    theta = np.where(
-        hinges.alone, angles(hinges.corners.reshape(-1, 3), corners), angles(x, hinges.nodes)
-    )
+    alone = angles(hinges.corners.reshape(-1, 3), corners)
+    theta = np.where(hinges.alone, alone, angles(x, hinges.nodes))
     hidden = np.where(hinges.hidden == NO_DOF, 0, hinges.hidden)
     theta = theta - (hinges.hidden_turn * q[hidden]).sum(axis=1)
     if sheet.offsets:

@@ -41,12 +41,10 @@ def ply_factors(
         Of direction 1 of the sheet from the first axis, rad.
     criterion : {"tsai_wu", "maximum_stress"}
     """
-    soft, bent = (
-        np.linalg.inv(turned_axes(own, angle)) for own in (sheet.stretching, sheet.bending)
-    )
-    strain, curvature = (
-        np.einsum("pab,...pb->...pa", *both) for both in ((soft, force), (bent, moment))
-    )
+    soft = np.linalg.inv(turned_axes(sheet.stretching, angle))
+    bent = np.linalg.inv(turned_axes(sheet.bending, angle))
+    strain = np.einsum("pab,...pb->...pa", soft, force)
+    curvature = np.einsum("pab,...pb->...pa", bent, moment)
     plies = sheet.plies or ()
     bounds, least = heights(plies), np.full(force.shape[:-1], np.inf)
     for ply, low, high in zip(plies, bounds[:-1], bounds[1:], strict=True):

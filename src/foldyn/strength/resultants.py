@@ -253,10 +253,8 @@ class PlateResultants:
                 if int(number) not in rigid:
                     alike.setdefault((edges, self._center(group, k)), []).append(k)
             for (edges, center), members in alike.items():
-                chosen = Group(
-                    group.panel,
-                    *(each[members] for each in (group.faces, group.frames, group.number)),
-                )
+                own = group.faces[members], group.frames[members], group.number[members]
+                chosen = Group(group.panel, *own)
                 found.append(self._kind(whole, chosen, edges, center))
         return found
 

@@ -315,12 +315,10 @@ class BarsHingesTerm(SheetTerm):
         """Arrays of this model with linear laws and with q as rest state."""
         linear = self.nominal(q).model
         x, runs = linear.rest + self._nodal(q), linear.bar_runs.copy()
-        vector = x[linear.bars[:, 1]] - x[linear.bars[:, 0]]
-        per_length2 = 1.0 / np.einsum("ij,ij->i", vector, vector)
+        bar = x[linear.bars[:, 1]] - x[linear.bars[:, 0]]
+        per_length2 = 1.0 / np.einsum("ij,ij->i", bar, bar)
         runs[:, 2] = 0
-        return linear._replace(
-            rest=x, bar_vector=vector, bar_per_length2=per_length2, bar_runs=runs
-        )
+        return linear._replace(rest=x, bar_vector=bar, bar_per_length2=per_length2, bar_runs=runs)
 
 
 def stretch(model: BarsHinges, motion: NDArray) -> float:

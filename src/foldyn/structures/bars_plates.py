@@ -295,10 +295,8 @@ class BarsPlatesTerm(SheetTerm):
 
     def actuated(self, numbers: NDArray) -> tuple[Self, NDArray, NDArray]:
         """See `SheetTerm`."""
-        model = self.model
-        own = self._with(
-            fold_rest=model.fold_rest.copy(), fold_parameters=model.fold_parameters.copy()
-        )
+        rest, parameters = self.model.fold_rest.copy(), self.model.fold_parameters.copy()
+        own = self._with(fold_rest=rest, fold_parameters=parameters)
         return own, np.asarray(numbers), np.arange(len(numbers))
 
     def turned(self) -> tuple[NDArray, NDArray]:
@@ -316,9 +314,8 @@ class BarsPlatesTerm(SheetTerm):
         edges = place[::3][model.hinges[model.rotation_hinge, :2]].min(axis=1)
         # number -1 comes last
         lowest = np.append(place[::3][model.hinges].min(axis=1), edges[::-1])
-        plates = np.array(
-            [lowest[model.angle[a:b]].min(initial=1) for a, b in pairwise(model.start)]
-        )
+        own = (lowest[model.angle[a:b]] for a, b in pairwise(model.start))
+        plates = np.array([numbers.min(initial=1) for numbers in own])
         return self._with(
             bars=self._bars.anchored(place).model,
             fold_stiffness=model.fold_stiffness * (lowest[: len(model.fold_rest)] == 0),
@@ -328,19 +325,12 @@ class BarsPlatesTerm(SheetTerm):
     def unstrained(self, q: NDArray) -> Unstrained | None:
         """See `SheetTerm`."""
         model, bars = self.model, self._bars.unstrained_model(q[: self._nodal])
-        angle, folds = self.angles(q), len(model.fold_rest)
-        sheet = self._with(
-            bars=bars,
-            fold_rest=angle[:folds],
-            bend_rest=angle[folds:],
-            code=np.full_like(model.code, LinearHinge.code),
-        )
+        folds, bends = np.split(self.angles(q), [len(model.fold_rest)])
+        code = np.full_like(model.code, LinearHinge.code)
+        sheet = self._with(bars=bars, fold_rest=folds, bend_rest=bends, code=code)
         rest = np.zeros(self.size)
-        return Unstrained(
-            sheet.tangent(rest),
-            sheet.hinges_alone().tangent(rest),
-            lambda motion: stretch(bars, motion[: self._nodal]),
-        )
+        tangent, turned = sheet.tangent(rest), sheet.hinges_alone().tangent(rest)
+        return Unstrained(tangent, turned, lambda motion: stretch(bars, motion[: self._nodal]))
 
 
 class ClampsTerm(BarsPlatesTerm):

@@ -96,9 +96,8 @@ def boundary_elements(
             "air",
         )
     if not alone:
-        refuse_junctions(
-            pattern, 'where the flow has several jumps; give added_mass = "local"', "air"
-        )
+        why = 'where the flow has several jumps; give added_mass = "local"'
+        refuse_junctions(pattern, why, "air")
     _check_convex(pattern)
     corners = _alone(_corners(pattern)) if alone else _corners(pattern)
     half = resolution // 2
@@ -189,10 +188,8 @@ def _numbered(corners: _Corners, half: int, panels: int) -> tuple[NDArray, int]:
         for edge, starts in zip((corners.ahead, corners.behind), corners.starts, strict=True)
     ]
     out[:, inside, 0], out[:, 0, inside] = ends
-    ways = [
-        spokes + corner[:, None] * len(inside) + inside - 1
-        for corner in (np.arange(count), corners.before)
-    ]
+    both = np.arange(count), corners.before
+    ways = [spokes + corner[:, None] * len(inside) + inside - 1 for corner in both]
     out[:, half, inside], out[:, inside, half] = ways
     own = grids + np.arange(count * len(inside) ** 2)
     out[:, 1:half, 1:half] = own.reshape(count, len(inside), len(inside))
@@ -217,10 +214,8 @@ def _places(corners: _Corners, half: int, structure: Discretized) -> NDArray:
     known = structure.centers >= 0
     centers[known] = nodes[structure.centers[known]]
     weights = np.stack([(1 - u) * (1 - v), u * (1 - v), u * v, (1 - u) * v], axis=-1)
-    quads = np.stack(
-        [here, 0.5 * (here + following), centers[corners.panel], 0.5 * (here + last)], axis=1
-    )
-    return np.einsum("cijk,cka->cija", weights, quads)
+    ends = here, 0.5 * (here + following), centers[corners.panel], 0.5 * (here + last)
+    return np.einsum("cijk,cka->cija", weights, np.stack(ends, axis=1))
 
 
 def _cut(numbers: NDArray) -> NDArray:

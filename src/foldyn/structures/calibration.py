@@ -148,10 +148,8 @@ def bar_areas(
             if merlin2 and all(e in creases for e in ends):
                 area = _merlin2_edges(area, ends, pattern, panel)
         else:
-            area = np.full(
-                len(face),
-                2.0 * panel_area[panel] * t / ((1.0 - nu) * (length.sum() + inner_sum[panel])),
-            )
+            whole = (1.0 - nu) * (length.sum() + inner_sum[panel])
+            area = np.full(len(face), 2.0 * panel_area[panel] * t / whole)
             inner[inside] = area[0] * stiffer
         for pair, value in zip(ends, area.tolist(), strict=True):
             edges[pair] = edges.get(pair, 0.0) + value * stiffer

@@ -278,10 +278,8 @@ def _basis(
             (between, bow, parabola), (between[:-1], e, 1.0), (between[1:], e, -1.0),
             (across, mean, sign), (across[:-1], d, sign[:-1]), (across[1:], d, -sign[1:]),
         ]  # fmt: skip
-    rows, columns, values = (
-        np.concatenate(each)
-        for each in zip(*(np.broadcast_arrays(*part) for part in parts), strict=True)
-    )
+    each = zip(*(np.broadcast_arrays(*part) for part in parts), strict=True)
+    rows, columns, values = map(np.concatenate, each)
     return sparse.csr_array((values, (rows, columns)), (size, size)), where
 
 

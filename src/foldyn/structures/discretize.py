@@ -178,9 +178,8 @@ def discretize(
     points = _given_centers({} if centers is None else centers, pattern, options.scheme)
     mesh = n4b5(pattern) if options.scheme == "n4b5" else n5b8(pattern, points)
     merlin2 = options.calibration == "merlin2"
-    inner_area, edge_area = bar_areas(
-        mesh, pattern, sheet, merlin2, alike=options.membrane == "panel"
-    )
+    coupling = options.membrane == "panel"
+    inner_area, edge_area = bar_areas(mesh, pattern, sheet, merlin2, alike=coupling)
     area = np.concatenate([inner_area, [edge_area[a, b] for a, b in pattern.lines.tolist()]])
 
     folds = fold_stiffness(options.crease_stiffness, pattern, sheet)
@@ -207,7 +206,7 @@ def discretize(
         onset = plate_onset(bends, large)
 
     coupled, gives = (), np.zeros((0, 2), np.int64)
-    if options.membrane == "panel":
+    if coupling:
         held = [*held_edges.straight_in_plane(options.straight, options.guided, pattern), *edges]
         coupled, gives = membranes(
             mesh, pattern, sheet, held, stiff, options.scheme == "n5b8e",

@@ -22,7 +22,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from itertools import pairwise
-from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -56,13 +55,12 @@ class EdgePlates(NamedTuple):
 
 
 def edge_plates(
-    mesh: Mesh, pattern: Pattern, sheet: Sheet,
-    straight_edges: Collection[topology.Edge] = (), rigid: Collection[int] = (),
-    clamped: Mapping[topology.Edge, float] = MappingProxyType({}),
+    mesh: Mesh, pattern: Pattern, sheet: Sheet, straight: Collection[topology.Edge],
+    rigid: Collection[int], clamped: Mapping[topology.Edge, float],
 ) -> EdgePlates:  # fmt: skip
     """Panels of a mesh with center nodes as plates.
 
-    straight_edges : boundary edges (low, high) that stay straight.
+    straight : boundary edges (low, high) that stay straight.
     rigid : indices of rigid panels, which have angles only at clamped edges.
     clamped : boundary edges that are clamped, with the stiffness, N m/rad, for rigid panels. Their
         hinges follow the hinges of bends and welds, in this order.
@@ -73,9 +71,7 @@ def edge_plates(
     hinge = {edge: folds + bends + k for edge, k in topology.edge_lookup(pattern.welds).items()}
     hinges = np.concatenate([mesh.folds, mesh.welds])
     hinge |= {edge: bends + len(hinges) + k for k, edge in enumerate(clamped)}
-    panels = outlines(
-        mesh.nodes, mesh.centers, hinges, pattern, sheet, straight_edges, rigid, clamped
-    )
+    panels = outlines(mesh.nodes, mesh.centers, hinges, pattern, sheet, straight, rigid, clamped)
     spokes = [len(face) if mesh.centers[p] >= 0 else 0 for p, face in enumerate(pattern.faces)]
     first = folds + np.concatenate([[0], np.cumsum(spokes)])
     rotations, ways = np.full((folds, 2), -1), np.ones((folds, 2))

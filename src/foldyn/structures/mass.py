@@ -235,11 +235,9 @@ def condensed_panels(surface: Surface) -> dict[int, NDArray]:
 def _without(surface: Surface, panels: NDArray) -> Surface:
     """The surface without the triangles of masked panels (np,)."""
     kept = ~panels[surface.triangle_panel]
-    return surface._replace(
-        triangles=surface.triangles[kept],
-        triangle_panel=surface.triangle_panel[kept],
-        triangle_area=surface.triangle_area[kept],
-    )
+    triangles, panel = surface.triangles[kept], surface.triangle_panel[kept]
+    area = surface.triangle_area[kept]
+    return surface._replace(triangles=triangles, triangle_panel=panel, triangle_area=area)
 
 
 def inertia_exact(surface: Surface) -> sparse.csr_array:
@@ -343,12 +341,3 @@ def inertia_tensor(nodes: NDArray, mass: sparse.csr_array) -> NDArray:
     arm = nodes - center_of_mass(nodes, mass)
     second = arm.T @ (mass @ arm)
     return np.trace(second) * np.eye(3) - second
-
-
-def rotational_inertia(mass: sparse.csr_array, nodes: NDArray, start: int, end: int) -> float:
-    """Moment of inertia (kg m2) of a mass matrix about the line through two nodes."""
-    axis = nodes[end] - nodes[start]
-    axis = axis / np.linalg.norm(axis)
-    arm = nodes - nodes[start]
-    arm = arm - np.outer(arm @ axis, axis)
-    return float(sum(arm[:, c] @ (mass @ arm[:, c]) for c in range(3)))

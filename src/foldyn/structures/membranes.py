@@ -25,7 +25,6 @@ between them, its *gives*. Near a vertex where the sheet is smooth
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
-from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -67,7 +66,7 @@ class Sides(NamedTuple):
 
 def membranes(
     mesh: Mesh, pattern: Pattern, sheet: Sheet, straight: Collection[Edge], rigid: Collection[int],
-    giving: bool = False, guided: Mapping[Edge, NDArray] = MappingProxyType({}),
+    giving: bool, guided: Mapping[Edge, NDArray],
 ) -> tuple[tuple[PanelKind, ...], NDArray]:  # fmt: skip
     """Membranes of all panels, and the edges (g, 2) of the gives, by number.
 
@@ -113,10 +112,8 @@ def membranes(
         alike = len(nodes), ends, int(shared.sum())
         kinds.setdefault(alike, []).append((p, nodes, number[shared], part))
     edges = np.array([edge for edge, _ in numbers], np.int64).reshape(-1, 2)
-    return tuple(
-        _packed(mesh.nodes, np.array(ends), *zip(*members, strict=True))
-        for (_, ends, _), members in kinds.items()
-    ), edges
+    parted = [(np.array(ends), zip(*own, strict=True)) for (_, ends, _), own in kinds.items()]
+    return tuple(_packed(mesh.nodes, ends, *columns) for ends, columns in parted), edges
 
 
 def _known(panel: Sides, sheet: Sheet, area: float, gives: bool, smooth: NDArray) -> Kind:
@@ -286,12 +283,10 @@ def swelling(
     x : (n, 3) rest positions of the nodes, m.
     """
     green, parts, pushes = strain + 0.5 * strain @ strain, [], []
-    strains = [
-        (np.einsum("bip,pij,bjp->bp", own.vector, green[which], own.vector) * own.per_length2)[
-            :, None
-        ]
-        for which, own in kinds
-    ]
+    strains = []
+    for which, own in kinds:
+        stretch = np.einsum("bip,pij,bjp->bp", own.vector, green[which], own.vector)
+        strains.append((stretch * own.per_length2)[:, None])
     for (_, own), both in zip(kinds, with_gives(kinds, strains), strict=True):
         push = np.einsum("ijp,jp->ip", own.stiffness[: len(own.ends)], both[:, 0])
         pushes.append(push.ravel())

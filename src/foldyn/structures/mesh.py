@@ -107,12 +107,9 @@ def n4b5(pattern: Pattern) -> Mesh:
 
 
 def _mesh(
-    pattern: Pattern,
-    nodes: NDArray,
-    centers: NDArray,
-    cut: Callable[[int], tuple[list[Triangle], list[Edge]]],
-    remedy: str,
-) -> Mesh:
+    pattern: Pattern, nodes: NDArray, centers: NDArray,
+    cut: Callable[[int], tuple[list[Triangle], list[Edge]]], remedy: str,
+) -> Mesh:  # fmt: skip
     """Mesh of a pattern whose panels are each `cut` into triangles with inner bars.
 
     The axis of a hinge runs from j to k, the direction in which wing i's triangle passes the
@@ -130,10 +127,8 @@ def _mesh(
         triangle_panel += [panel] * len(pieces)
         inner += bars
         inner_panel += [panel] * len(bars)
-    bends = [
-        (a, b, third[panel, a, b], third[panel, b, a])
-        for panel, (a, b) in zip(inner_panel, inner, strict=True)
-    ]
+    owned = zip(inner_panel, inner, strict=True)
+    bends = [(a, b, third[panel, a, b], third[panel, b, a]) for panel, (a, b) in owned]
 
     def hinges(*creases: NDArray) -> NDArray:
         rows = []

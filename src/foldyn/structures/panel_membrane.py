@@ -165,9 +165,8 @@ def _graded(kinds: Sequence[Kind]) -> list[PanelMesh]:
     x = gradings[0]._replace(radius=1.0).points(_pieces(corners / radius))
     used, fans = _fans(corners.shape[1], gradings[0].arcs)
     points = np.concatenate([radius * x.reshape(len(x), -1, 2), corners], axis=1)[:, used]
-    return [
-        _quadratic(own, fans, grading.radius) for own, grading in zip(points, gradings, strict=True)
-    ]
+    pairs = zip(points, gradings, strict=True)
+    return [_quadratic(own, fans, grading.radius) for own, grading in pairs]
 
 
 @lru_cache(maxsize=64)

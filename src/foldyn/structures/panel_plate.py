@@ -78,13 +78,9 @@ class Outline(NamedTuple):
 
 
 def outline(
-    x: NDArray,
-    center: NDArray | None,
-    creased: list[bool],
-    straight: list[bool],
-    bowed: Sequence[bool] = (),
-    clamped: Sequence[bool] = (),
-) -> Outline:
+    x: NDArray, center: NDArray | None, creased: list[bool], straight: list[bool],
+    bowed: Sequence[bool] = (), clamped: Sequence[bool] = (),
+) -> Outline:  # fmt: skip
     """Outline of a panel with corners x (m, 3), with size 1 and its first edge along an axis.
 
     By default no edge is bowed or clamped.
@@ -141,12 +137,9 @@ def meshed(
     place = np.full((n + 1, n + 1), -1)
     place[i, j] = np.arange(len(i))
     up, down = np.argwhere(sums < n), np.argwhere(sums < n - 1)
-    small = np.concatenate(
-        [
-            np.stack([place[*(up + step).T] for step in ((0, 0), (1, 0), (0, 1))], axis=1),
-            np.stack([place[*(down + step).T] for step in ((1, 0), (1, 1), (0, 1))], axis=1),
-        ]
-    )
+    rising = [place[*(up + step).T] for step in ((0, 0), (1, 0), (0, 1))]
+    falling = [place[*(down + step).T] for step in ((1, 0), (1, 1), (0, 1))]
+    small = np.concatenate([np.stack(rising, axis=1), np.stack(falling, axis=1)])
     weights = np.column_stack([n - i - j, i, j]) / n
     everywhere = np.concatenate([weights @ points[list(facet)] for facet in facets])
     _, first, same = np.unique(everywhere.round(7), axis=0, return_index=True, return_inverse=True)

@@ -80,9 +80,8 @@ def panel_plates(
     bends, creases = np.empty(len(mesh.inner)), np.zeros(len(pattern.creases))
     for p in range(count):
         own = slice(first[p], first[p + 1])
-        stiffness, compliance = quads.get(p) or _other(
-            mesh, pattern, p, own, float(nu[p]), -1 in edges[p]
-        )
+        free = -1 in edges[p]
+        stiffness, compliance = quads.get(p) or _other(mesh, pattern, p, own, float(nu[p]), free)
         bends[own] = modulus[p] * stiffness
         for (a, b), c in zip(around(pattern.faces[p]), compliance.tolist(), strict=True):
             for k in rows.get(edge_of(a, b), ()):

@@ -32,10 +32,8 @@ def one_or_two(
             "across",
             name,
         )
-    first, second = (
-        number(f"{name}[{k}]", each, above=above, unit=unit) for k, each in enumerate(value)
-    )
-    return first, second
+    first = number(f"{name}[0]", value[0], above=above, unit=unit)
+    return first, number(f"{name}[1]", value[1], above=above, unit=unit)
 
 
 def check_material(given: Mapping[str, Any], needed: Sequence[str]) -> None:

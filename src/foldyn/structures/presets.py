@@ -25,9 +25,7 @@ OF_HINGES = {"scheme", "calibration", "bend_law"}
 PRESETS: Mapping[str, ModelOptions] = {
     N5B8E: ModelOptions(scheme="n5b8e", mass="condensed", membrane="panel", bar_law="linear"),
     PLATE: ModelOptions(membrane="panel", bar_law="linear"),
-    HERKAL: ModelOptions(
-        mass="mixed_voronoi", bend_law="superlinear", calibration="standard"
-    ),
+    HERKAL: ModelOptions(mass="mixed_voronoi", bend_law="superlinear", calibration="standard"),
     MERLIN2: ModelOptions(
         mass="mixed_voronoi", bend_law="superlinear", calibration="merlin2",
         fold_law=EnhancedLinear(rest="as_published"),

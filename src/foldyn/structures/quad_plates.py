@@ -197,9 +197,8 @@ def flexibilities(x: NDArray, straight: NDArray, poissons_ratio: NDArray) -> NDA
     poissons_ratio : (p,)
     """
     told = np.concatenate([x.reshape(-1, 8), straight, poissons_ratio[:, None]], axis=1)
-    _, first, same = np.unique(
-        told.round(DIGITS) + 0.0, axis=0, return_index=True, return_inverse=True
-    )
+    told = told.round(DIGITS) + 0.0
+    _, first, same = np.unique(told, axis=0, return_index=True, return_inverse=True)
     found = [np.zeros((0, 5, 5))]
     for start in range(0, len(first), CHUNK):
         part = first[start : start + CHUNK]

@@ -198,9 +198,8 @@ class Structure(Discretized):
         if not len(self.clamps):
             return body
         clamps = edge_angles.clamps_model(self.nodes, self.clamps, self.clamp_stiffness)
-        return body.with_terms(
-            ClampsTerm(clamps, (materials.LinearHinge(), materials.LinearHinge()))
-        )
+        linear = materials.LinearHinge()
+        return body.with_terms(ClampsTerm(clamps, (linear, linear)))
 
     def _coupled(self, sheet: BarsHingesTerm | BarsPlatesTerm) -> Assembly:
         """A body: the sheet, with the membranes of the panels in place of independent bars."""
@@ -249,10 +248,8 @@ class Structure(Discretized):
         onset = self.bend_onset if own else None
         folds = self.folds, self.fold_stiffness, self.fold_rest
         bends = self.bends, self.bend_stiffness, self.bend_rest
-        return (
-            HingeKind("fold", self.fold_law, *folds, softness=self._softness),
-            HingeKind("bend", law, *bends, onset=onset),
-        )
+        fold = HingeKind("fold", self.fold_law, *folds, softness=self._softness)
+        return fold, HingeKind("bend", law, *bends, onset=onset)
 
     @cached_property
     def mass(self) -> sparse.csr_array:
@@ -328,11 +325,8 @@ class Structure(Discretized):
         if len(self.clamps):
             parts.append(self._clamping(turning[count:]))
         push, count = self.body.sheet.per_hidden * moment[~on_hinge], len(plates.rotation_hinge)
-        return (
-            joined((part, 0) for part in parts),
-            np.bincount(-1 - plates.angle[~on_hinge], push, minlength=count),
-            moment,
-        )
+        pushes = np.bincount(-1 - plates.angle[~on_hinge], push, minlength=count)
+        return joined((part, 0) for part in parts), pushes, moment
 
     @cached_property
     def surface(self) -> Surface:
@@ -393,9 +387,8 @@ class Structure(Discretized):
             is the exact second derivative of the energy: singular at rest where superlinear bends
             have no slope.
         """
-        return balanced(
-            self.body.tangent(self.body.dofs(self._displacement(u)), floor), self.body.hidden
-        )
+        tangent = self.body.tangent(self.body.dofs(self._displacement(u)), floor)
+        return balanced(tangent, self.body.hidden)
 
     def dihedrals(self, u: ArrayLike) -> tuple[NDArray, NDArray]:
         """Dihedrals (rad) of folds (nf,) and bends (nh,) at displacement u (n, 3), m."""

@@ -27,14 +27,8 @@ from foldyn.mechanics.viscous import Viscous, ViscousTerm, viscous
 TOPOLOGY = ("bars", "bar_runs", "hinges", "hinge_runs", "hinge_group", "addresses")
 OF_PLATES = "hinges", "fold_rotations", "fold_ways", "code", "start", "angle", "entry"
 OF_PANELS = (
-    "wings",
-    "unmoved",
-    "fold_stiffness",
-    "fold_rest",
-    "fold_parameters",
-    "bend_rest",
-    "stiffness",
-)
+    "wings", "unmoved", "fold_stiffness", "fold_rest", "fold_parameters", "bend_rest", "stiffness",
+)  # fmt: skip
 NO_SPRINGS = Made().springs()
 NONE = np.zeros(0, np.int64)
 NO_DAMPERS = viscous(
@@ -72,12 +66,10 @@ class CaseArrays:
             self._add(model.hinges[:, v])
         panels = self._terms(bodies, MembranesTerm)
         membranes = [self._membranes([term.membranes for term in own]) for own in panels]
-        springs = self._springs(
-            [term.springs for term in (self._terms(bodies, SpringsTerm) or [[]])[0]]
-        )
-        dampers = self._dampers(
-            [[t.elements for t in own] for own in self._terms(bodies, ViscousTerm)]
-        )
+        drawn = self._terms(bodies, SpringsTerm) or [[]]
+        springs = self._springs([term.springs for term in drawn[0]])
+        damped = self._terms(bodies, ViscousTerm)
+        dampers = self._dampers([[term.elements for term in own] for own in damped])
         damping = self._damping(cases)
         hidden = 3 * len(first.mass.hidden)
         coupled = self._plates(plates, hidden) if plates else ()

@@ -95,13 +95,9 @@ class Span(NamedTuple):
 def panels_to(kind, m, u, slot, size, at_slot, who, crowd, sampled, strain):
     """Write forces on corners and gives of the panels of one kind; return the next free slot."""
     own = Membranes(
-        kind.nodes,
-        kind.ends,
-        kind.gives,
-        at(kind.vector, m),
-        at(kind.per_length2, m),
+        kind.nodes, kind.ends, kind.gives, at(kind.vector, m), at(kind.per_length2, m),
         at(kind.stiffness, m),
-    )
+    )  # fmt: skip
     count, corners, bars = own.nodes.shape[0], own.nodes.shape[1], own.ends.shape[0]
     given = own.gives.shape[1]
     stretch, along = cuda.local.array(MOST_BARS, float64), cuda.local.array(3, float64)
@@ -149,10 +145,8 @@ def dampers_to(dampers, m, u, v, slot, size, at_slot, who, crowd):
             rate += g[c] * v[own.dofs[e, c]]
         resisted = own.coefficient[e] * rate
         for k in range(4):
-            s = at_slot + k * count + e
-            put(
-                slot, size, s, resisted * g[3 * k], resisted * g[3 * k + 1], resisted * g[3 * k + 2]
-            )
+            s, i = at_slot + k * count + e, 3 * k
+            put(slot, size, s, resisted * g[i], resisted * g[i + 1], resisted * g[i + 2])
         slot[own.dofs[e, 12] % 3 * size + at_slot + e] += resisted * (g[12] + g[13])
         power += resisted * rate
     return power
@@ -180,9 +174,8 @@ def forces_to(
     s = panels_to(kinds[0], m, u, slot, size, s, who, crowd, sampled, strain)
     s = panels_to(kinds[1], m, u, slot, size, s, who, crowd, sampled, strain)
     s = panels_to(kinds[2], m, u, slot, size, s, who, crowd, sampled, strain)
-    s = springs_to(
-        elements.springs, m, counts.spring_group, u, slot, size, s, who, crowd, sampled, strain
-    )
+    springs, group = elements.springs, counts.spring_group
+    s = springs_to(springs, m, group, u, slot, size, s, who, crowd, sampled, strain)
     power = dampers_to(elements.viscous, m, flat_u, flat_v, slot, size, s, who, crowd)
     s += 4 * elements.viscous.dofs.shape[0]
     power += damping_to(elements.damping, m, counts.damped, flat_v, slot, size, s, who, crowd)
@@ -285,11 +278,8 @@ def kernel(method: str, wide: bool, shared: bool, plates: bool) -> Any:
         u, v, angle = state.u[m], state.v[m], state.angle[m]
         du, dv = state.first[m], state.second[m]
         mass, inverse, alpha = at(nodes.mass, m), at(nodes.inverse, m), nodes.alpha[m]
-        load_start, load, load_row = (
-            at(nodes.load_start, m),
-            at(nodes.load, m),
-            at(nodes.load_row, m),
-        )
+        load_start = at(nodes.load_start, m)
+        load, load_row = at(nodes.load, m), at(nodes.load_row, m)
         if plates:
             table, of = elements.plates, elements.plates.model
             sheet = BarsPlates(

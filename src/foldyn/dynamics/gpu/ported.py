@@ -65,11 +65,8 @@ def ported(function: Any) -> Any:
         code = list(dis.get_instructions(source))
         read = {step.argval for step in code if step.opname == "LOAD_GLOBAL"}
         asked = {step.argval for step in code if step.opname in ("LOAD_ATTR", "LOAD_METHOD")}
-        known = {
-            name: _replaced(value, asked)
-            for name, value in source.__globals__.items()
-            if name in read
-        }
+        given = source.__globals__.items()
+        known = {name: _replaced(value, asked) for name, value in given if name in read}
         made = FunctionType(source.__code__, known, source.__name__, source.__defaults__)
         made.__module__ = source.__module__
         _made[function] = on_device(made)

@@ -76,23 +76,19 @@ class StepContact:
 
         factor0, factor1 : (h, 3) factors of the histories at the start and the end.
         """
-        kept = self._memory
+        own, kept, force = self._tables, self._memory, self._on_points
         for moved, factor in zip(self._moved, (factor0, factor1), strict=True):
-            move_planes(self._tables, factor, kept)
+            move_planes(own, factor, kept)
             moved[:] = kept.moved[:, :3]
         for end, u in zip(self._ends, (u0, u1), strict=True):
             end[:] = u  # the contact term changes planes and factors in place
-        force = self._on_points
-        p0, p1 = self._contact.points(u0), self._contact.points(u1)
+        p0, p1, middle = self._contact.points(u0), self._contact.points(u1), self._middle
         force[:] = 0.0
-        self._counts = _find(self._tables, p0, p1, self._start, self._middle, kept, self._pairs)
+        self._counts = _find(own, p0, p1, self._start, middle, kept, self._pairs)
         kept.facts.energy = self._steps(False, force)[2]
-        if self._tables.friction > 0.0:
-            _add_rubs(self._tables, self._middle, kept, self._pairs, *self._counts, self.rub, force)
-        _add_others(
-            self._tables, self._start, self._middle, self._moved, kept, self._move, self.push,
-            force,
-        )  # fmt: skip
+        if own.friction > 0.0:
+            _add_rubs(own, middle, kept, self._pairs, *self._counts, self.rub, force)
+        _add_others(own, self._start, middle, self._moved, kept, self._move, self.push, force)
         back = self._contact.step_back(*self._ends, force)
         self.force[: len(back)] = back
 

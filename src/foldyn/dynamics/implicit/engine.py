@@ -70,11 +70,11 @@ class ImplicitEngine(Engine):
         state: MotionState, plan: StepPlan, jumps: tuple[float, ...],
     ) -> None:  # fmt: skip
         self._packed, self._state, self._plan, self._jumps = packed, state, plan, jumps
-        self._scheme = make(packed, state)
-        self._matrix = StepMatrix(packed, self._scheme.symmetric)
+        self.scheme = make(packed, state)
+        self._matrix = StepMatrix(packed, self.scheme.symmetric)
         touches = packed.system.touches
-        self._touching = TouchingNewton(self._scheme, self._matrix) if touches else None
-        self._newton = self._touching or Newton(self._scheme, self._matrix)
+        self._touching = TouchingNewton(self.scheme, self._matrix) if touches else None
+        self._newton = self._touching or Newton(self.scheme, self._matrix)
         self._halved = 0
         self._horizon = 0.0  # duration of an impulse's effect, s
         self._end: NDArray | None = None
@@ -86,7 +86,7 @@ class ImplicitEngine(Engine):
 
     def facts(self) -> dict[str, Any]:
         """Statistics of the run; see `Engine`."""
-        facts = dict(self._scheme.facts) | {
+        facts = dict(self.scheme.facts) | {
             "iterations": self._newton.iterations,
             "factorizations": self._matrix.factorizations,
             "linear_solver": self._matrix.solver,
@@ -112,7 +112,7 @@ class ImplicitEngine(Engine):
 
     def _resume(self, values: NDArray) -> bool:
         """Resume from the numbers of `continuation`; return whether they fit this motion."""
-        scheme, old, tally = self._scheme, self._scheme.old, self._state.tally
+        scheme, old, tally = self.scheme, self.scheme.old, self._state.tally
         own = [*self._numbers(), old.a]
         if values.shape != (sum(array.size for array in own),) or not np.isfinite(values).all():
             return False
@@ -144,11 +144,10 @@ class ImplicitEngine(Engine):
 
     def _acceleration(self) -> NDArray:
         """Current acceleration (n, 3); zero for nodes without mass."""
-        memory, out = self._memory, np.zeros_like(self._scheme.old.a)
+        scheme, memory, t = self.scheme, self._memory, float(self._state.tally.time)
+        old, out = scheme.old, np.zeros_like(scheme.old.a)
         if memory is not None:
             memory.still()
-        old, t = self._scheme.old, float(self._state.tally.time)
-        scheme = self._scheme
         accelerate(scheme.equation.handle, old.q, old.w, t, out)
         out[scheme.massless] = 0.0
         return out
@@ -157,7 +156,7 @@ class ImplicitEngine(Engine):
         """Numbers that the next steps depend on, apart from the case and the time."""
         measured = [float(self._state.tally[name]) for name in MEASURED]
         state = [self._state.angle.copy(), np.array([*measured, self._horizon])]
-        return [*self._scheme.numbers(), *state, *self._newton.numbers()]
+        return [*self.scheme.numbers(), *state, *self._newton.numbers()]
 
     def checkpoint_arrays(self) -> dict[str, NDArray]:
         """All arrays and numbers of `changing`, by name; see `Engine`."""
@@ -178,7 +177,7 @@ class ImplicitEngine(Engine):
 
     def changing(self) -> dict[str, Any]:
         """What the next steps depend on; see `Engine`."""
-        own = {"engine": self, "scheme": self._scheme, "newton": self._newton}
+        own = {"engine": self, "scheme": self.scheme, "newton": self._newton}
         return state_parts(self._packed, self._state) | own | {"matrices": self._matrix.changing}
 
     def advance(self, out: Samples, stretch: int) -> tuple[int, int]:
@@ -205,13 +204,12 @@ class ImplicitEngine(Engine):
         return Outcome.DONE, -1
 
     def _begin(self, out: Samples) -> int:
-        scheme, plan = self._scheme, self._plan
+        scheme, plan, packed = self.scheme, self._plan, self._packed
         scheme.begin(plan.start)
         self._state.tally.farthest = _largest(scheme.displacement())
-        if self._packed.system.varies and not plan.steps:
-            self._horizon = impulse_duration(
-                scheme, self._matrix, self._packed, plan.end - plan.start
-            )
+        if packed.system.varies and not plan.steps:
+            whole = plan.end - plan.start
+            self._horizon = impulse_duration(scheme, self._matrix, packed, whole)
         if self._touching is not None:
             self._touching.begin()
         self._newton.prepare(plan.dt, plan.start)
@@ -222,7 +220,7 @@ class ImplicitEngine(Engine):
 
     def _sample(self, t: float, out: Samples) -> int:
         """Write a sample."""
-        scheme, state = self._scheme, self._state
+        scheme, state = self.scheme, self._state
         return write(scheme.equation.recording(out), state.u, state.v, t, scheme.out)
 
     def _fixed(self, out: Samples) -> tuple[int, int]:
@@ -307,12 +305,12 @@ class ImplicitEngine(Engine):
 
     def _attempt(self, h: float, end: float, jump: float | None) -> tuple[int, int]:
         """Solve a step that ends just before the jump, if any; returns (outcome, hinge)."""
-        self._scheme.predict(h)
+        self.scheme.predict(h)
         moment = end if jump is None else math.nextafter(min(end, jump), -math.inf)
         verdict = self._newton.solve(h, moment)
         if self._packed.callbacks.error is not None:
             return Outcome.NOT_FINITE, -1
-        turned = np.abs(self._scheme.part.angle - self._state.angle)
+        turned = np.abs(self.scheme.part.angle - self._state.angle)
         if turned.max(initial=0.0) > TURN:
             return Outcome.PENETRATION, int(turned.argmax())
         return OUTCOMES.get(verdict, Outcome.NOT_CONVERGED), -1
@@ -322,7 +320,7 @@ class ImplicitEngine(Engine):
         return h < LEAST_STEP * self._plan.dt or self._packed.callbacks.error is not None
 
     def _accept(self, h: float, end: float, jump: float | None) -> None:
-        scheme, state = self._scheme, self._state
+        scheme, state = self.scheme, self._state
         done, lost, to_air = scheme.works(h)
         state.tally.work += done
         state.tally.dissipated += lost
@@ -357,7 +355,7 @@ class ImplicitEngine(Engine):
         this order, so this error may reach the tolerance to the power 2/3. In a step shorter than a
         vibration, it acts as an impulse: its error is the displacement that it causes later.
         """
-        scheme, matrix, plan = self._scheme, self._matrix, self._plan
+        scheme, matrix, plan = self.scheme, self._matrix, self._plan
         scale = max(float(self._state.tally.farthest), _largest(scheme.moved()))
         reference, error, force = max(scale, plan.floor), 0.0, scheme.unseen(t, t + h)
         if force is not None:

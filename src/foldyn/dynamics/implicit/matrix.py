@@ -89,12 +89,8 @@ class StepMatrix:
         self._follow, *slots = (entry_slots(self.pattern, *each) for each in places)
         self._damped = np.concatenate([np.zeros(0, np.int64), *slots])
         self._matrices = Matrices(self.stiffness, masses, damping)
-        held = np.zeros(3 * nodes, bool)
-        held[system.supported] = True
-        held[system.ties.slave] = True
-        held[self.blocks.unused] = True
-        along = self.blocks.order
-        self.free = along[~held[along]]
+        held = np.concatenate([system.supported, system.ties.slave, self.blocks.unused])
+        self.free = self.blocks.order[~np.isin(self.blocks.order, held)]
         self._ties = system.ties
         self.added: sparse.csr_array | None = None
         self._onto = onto(self.free, self._ties, 3 * nodes) if system.touches else None

@@ -233,12 +233,8 @@ class Scheme(ABC):
         inertia = self.weights(h).mass * float(np.linalg.norm(mass * self.shift))
         rounding = self.rounding + EPS * inertia
         most = max(OF_MOTION * inertia, rounding)
-        return Goal(self.tolerance, self.hinge_forces(), most, rounding)
-
-    def hinge_forces(self) -> float:
-        """Norm (N) of the hinge forces at old.q, at play even if everything is at rest."""
-        forces = self.packed.body.hinge_forces(self.displacement())
-        return float(np.linalg.norm(forces))
+        hinges = self.packed.body.hinge_forces(self.displacement())  # at play also at rest
+        return Goal(self.tolerance, float(np.linalg.norm(hinges)), most, rounding)
 
     def displacement(self) -> NDArray:
         """Displacement (n, 3) at old.q, support motion included."""

@@ -54,10 +54,8 @@ def inductance(points: NDArray, triangles: NDArray, unknown: NDArray) -> NDArray
     )  # curl of each corner's shape function, along the opposite side
     numbers = unknown[triangles]
     size, count = int(unknown.max(initial=-1)) + 1, len(triangles)
-    owner = sparse.csr_array(
-        (np.ones(numbers.size), (numbers.ravel() + 1, np.repeat(np.arange(count), 3))),
-        (size + 1, count),
-    )
+    row, column = numbers.ravel() + 1, np.repeat(np.arange(count), 3)
+    owner = sparse.csr_array((np.ones(row.size), (row, column)), (size + 1, count))
     out = np.zeros((size, size))
     do = in_threads if count > FEW else _one_by_one
     most = max(int(BLOCK / (8 * count)), ROWS)

@@ -89,10 +89,8 @@ class BoardContactTerm(ContactTerm):
 
     def tangent_at(self, q: NDArray, kept: Memory) -> sparse.csr_array:
         """Tangent with respect to nodes at the last evaluation; see `ContactTerm`."""
-        tables, push = self.tables, np.zeros_like(kept.x)
-        add_contact(
-            Context(tables), kept.x - tables.rest, self._guarded.angles(q), push, Context(kept)
-        )
+        tables, push, angle = self.tables, np.zeros_like(kept.x), self._guarded.angles(q)
+        add_contact(Context(tables), kept.x - tables.rest, angle, push, Context(kept))
         motion = boards.jacobian(self.ride, nodal(q), q.size)
         inner = contact_tangent(tables, kept, push.size)
         bent = boards.curvature(self.ride, nodal(q), push, q.size)

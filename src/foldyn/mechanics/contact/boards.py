@@ -110,11 +110,8 @@ def ride_on(
         heights=heights * share,
         reach=moved**2 * share[:, :, None],
     )
-    return (
-        ride,
-        np.concatenate([key // n, np.full(n, -1)]).astype(np.int64),
-        np.concatenate([key % n, np.arange(n)]).astype(np.int64),
-    )
+    panels = np.concatenate([key // n, np.full(n, -1)]).astype(np.int64)
+    return ride, panels, np.concatenate([key % n, np.arange(n)]).astype(np.int64)
 
 
 def carried(ride: Ride, chosen: NDArray[np.bool_]) -> NDArray[np.bool_]:

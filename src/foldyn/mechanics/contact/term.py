@@ -226,9 +226,8 @@ class ContactTerm(Term):
         kept = memory(own, self.sheets.panels)  # lists pairs
         energy = self._copy(tables=own, memory=kept, _moved=np.zeros((0, 3))).contact(q)[0]
         counts = int(kept.counts.listed_first), int(kept.counts.listed_second)
-        share = np.concatenate(
-            [1.0 + kept.gap[k, :n] / kept.d0[k, :n] for k, n in enumerate(counts)]
-        )
+        parts = [1.0 + kept.gap[k, :n] / kept.d0[k, :n] for k, n in enumerate(counts)]
+        share = np.concatenate(parts)
         if not share.size:
             return energy, np.inf, np.zeros((0, 2), np.int64)
         worst = int(share.argmin())
