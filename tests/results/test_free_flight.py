@@ -7,6 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import foldyn as fd
+from foldyn.cli.main import main
 from foldyn.errors import InputError
 
 SHEET = fd.Sheet(1e10, 0.3, 0.01, density=100.0)
@@ -89,3 +90,38 @@ def test_what_is_no_motion_or_no_panel_is_refused():
     run = fd.simulate(case, 0.01, method="rk4", initial=state)
     with pytest.raises(InputError, match="panel"):
         fd.attitude(run, panel=1)
+
+
+def test_the_picture_and_the_page_show_the_attitude(tmp_path):
+    """A spin about z by 9 rad/s turns by 9 t rad."""
+    case, state = thrown(square(), spin=np.array([0.0, 0.0, 9.0]))
+    run = fd.simulate(case, 0.5, method="rk4", interval=0.05, initial=state)
+    left, right = fd.plots.plot_attitude(run).axes
+    turn, speed = ({one.get_label(): one for one in each.lines} for each in (left, right))
+    assert turn["about z"].get_ydata() == pytest.approx(np.degrees(9.0 * run.time), rel=1e-6)
+    assert speed["about z"].get_ydata() == pytest.approx(9.0, rel=1e-6)
+    assert np.abs(turn["about x"].get_ydata()).max() < 1e-6
+
+    file = tmp_path / "top.toml"
+    text = """
+        [pattern]
+        kind = "simple_fold"
+        [sheet]
+        youngs_modulus = 1e6
+        poissons_ratio = 0.25
+        thickness = 0.01
+        density = 1.0
+        {}
+        [[loads]]
+        gravity = [0, 0, -9.81]
+        [analysis]
+        kind = "dynamics"
+        duration = 0.01
+        [output]
+        interval = 0.002
+    """
+    for supports, told in (("", True), ("[[supports]]\n        nodes = [0, 1]", False)):
+        file.write_text(text.format(supports))
+        assert main(["run", str(file), "--out", str(tmp_path / "out")]) == 0
+        page = (tmp_path / "out/report.html").read_text("utf-8")
+        assert ("Attitude of the body" in page) is told

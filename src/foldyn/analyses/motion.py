@@ -31,6 +31,7 @@ from foldyn.dynamics.initial import MODAL
 from foldyn.dynamics.method_choice import AUTO
 from foldyn.dynamics.timing import check_room, check_samples
 from foldyn.errors import InputError
+from foldyn.plots.flight import attitude_charts
 from foldyn.plots.load_curves import load_charts
 from foldyn.report.album import (
     Album,
@@ -108,7 +109,7 @@ class MotionAnalysis(Analysis):
     schema = MotionSchema
     needs_density = "a motion needs"
     takes = arguments_of(prepare)
-    files = ("load", "motion", "motion.gif", "motion.mp4", "energies", *FILES)
+    files = ("load", "motion", "motion.gif", "motion.mp4", "energies", "attitude", *FILES)
 
     @classmethod
     def of(cls, schema: Any, case: Case) -> Self:
@@ -208,6 +209,15 @@ class MotionAnalysis(Analysis):
             f"Energies over time and the error of their balance, mass rule {first}.",
             lambda: plots.plot_energies(trajectory),
         )
+        if not len(case.reaction_dofs) and not case.structure.linear:
+            text = (
+                "Attitude of the body, which nothing holds: its mean rotation from rest as a "
+                f"vector, and its angular velocity, mass rule {first}."
+            )
+            charts = Charts(attitude_charts(trajectory), text)
+            yield from album.figure(
+                "attitude", text, lambda: plots.plot_attitude(trajectory), charts
+            )
         if shown.stresses:
             yield from stress_sections(trajectory, album)
         yield Heading("The numbers")

@@ -23,6 +23,7 @@ from foldyn.plots.energies import (
     plot_path_energies as plot_path_energies,
 )
 from foldyn.plots.fidelity import plot_fidelity as plot_fidelity
+from foldyn.plots.flight import plot_attitude as plot_attitude
 from foldyn.plots.folding import animate_folding as animate_folding, draw_folding as draw_folding
 from foldyn.plots.frf import plot_frf as plot_frf
 from foldyn.plots.history import plot_history as plot_history
