@@ -75,11 +75,9 @@ class Lattice:
         pattern: Pattern = cell.case.structure.pattern
         self.cell, self.pattern, self.zero = cell, pattern, (0,) * cell.dimensions
         self.vertices = cell.copies.named
-        self.faces: list[list[Vertex]] = []
-        self.steps: list[Step] = []
-        for step, corners in cell.copies.panels(pattern):
-            self.faces.append(corners)
-            self.steps.append(step)
+        panels = cell.copies.panels(pattern)
+        self.steps = [step for step, _ in panels]
+        self.faces = [corners for _, corners in panels]
         self.beside: dict[Kind, list[tuple[int, Step]]] = {}
         for f in range(len(self.faces)):
             for edge in self._edges(f):
@@ -128,9 +126,7 @@ class Lattice:
 
         Two panels alone would share a front: none are left alone at a junction of several.
         """
-        found = {
-            (minus(self.zero, step), f) for f, face in enumerate(self.faces) for step, _ in face
-        }
+        found = {(minus(self.zero, step), f) for f, own in enumerate(self.faces) for step, _ in own}
         for _ in range(RINGS):
             found |= {other for panel in found for other in self._across(*panel)}
         while missing := self._beside_pairs(found) - found:
@@ -191,16 +187,12 @@ class Lattice:
             flat = np.abs(bare.dihedrals - np.pi) < FLAT
             of_crease = kinds_of(bare.creases, vertices)
             geometric = np.where(flat, "U", np.array(bare.assignments, np.str_))
-            given = {
-                pair: letters.get(kind, letter)
-                for pair, kind, letter in zip(
-                    map(tuple, bare.creases.tolist()), of_crease, geometric.tolist(), strict=True
-                )
-            }
+            pairs = map(tuple, bare.creases.tolist())
+            each = zip(pairs, of_crease, geometric.tolist(), strict=True)
+            given = {pair: letters.get(kind, letter) for pair, kind, letter in each}
             families = {
                 name: [tuple(bare.creases[k]) for k, kind in enumerate(of_crease) if kind in own_]
                 for name, own_ in self.families().items()
             }
-            return bare.changed(
-                assignments=given, families={k: pairs for k, pairs in families.items() if pairs}
-            )
+            kept = {name: pairs for name, pairs in families.items() if pairs}
+            return bare.changed(assignments=given, families=kept)
