@@ -94,7 +94,7 @@ def relaxed(
         place, now = rest + displacement, deformed_motions(cell, patch, displacement)
     end = now if motions is None else _given(cell, motions)
     first = np.array([images(now, place[v], -patch.own_step[v]) for v in patch.first.tolist()])
-    first, begin = first.reshape(-1, 3), np.array([motion.twist for motion in now])
+    begin = np.array([motion.twist for motion in now])
     way = np.array([motion.twist for motion in end]) - begin
     for k in range(1, steps + 1):
         share = k / steps

@@ -213,10 +213,9 @@ class LinearizedCell:
     @property
     def variables(self) -> dict[str, Any]:
         """Variables of results that describe the state."""
-        angles, axes, points = (
-            np.array([getattr(motion, name) for motion in self.motions])
-            for name in ("angle", "unit", "point")
-        )
+        angles = [motion.angle for motion in self.motions]
+        axes = np.array([motion.unit for motion in self.motions])
+        points = np.array([motion.point for motion in self.motions])
         return {
             "vectors": (("period", "axis"), self.vectors, {"units": "m"}),
             "angles": ("period", np.radians(angles), {"units": "rad"}),
@@ -375,9 +374,7 @@ def tiled(
         Nodes do not coincide with the copies of their partners.
     """
     place = cell.case.structure.nodes + displacement
-    first = np.array(
-        [images(motions, place[v], -patch.own_step[v]) for v in patch.first.tolist()]
-    ).reshape(-1, 3)
+    first = np.array([images(motions, place[v], -patch.own_step[v]) for v in patch.first.tolist()])
     off = np.linalg.norm(spread(motions, first, patch.own_unit, patch.own_step) - place, axis=1)
     worst = int(off.argmax())
     if off[worst] > SLACK * cell.near:
@@ -419,8 +416,6 @@ def _residual(reach: CellReach, q: NDArray) -> float:
     """Largest force on a free dof of cell 0, as a fraction of the forces that act."""
     force = reach.forces(q)
     left = float(np.abs(reach.projected(force)).max(initial=0.0))
-    at_play = max(
-        float(np.abs(each).max(initial=0.0))
-        for each in (force, reach.body.hinge_forces(q)[reach.rows])
-    )
+    every = np.concatenate([force, reach.body.hinge_forces(q)[reach.rows]])
+    at_play = float(np.abs(every).max(initial=0.0))
     return 0.0 if left <= ROUNDING * float(reach.body.scale().max()) else left / at_play
