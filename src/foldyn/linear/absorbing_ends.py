@@ -205,9 +205,8 @@ def absorbing_end(case: Case, nodes: Nodes, *, waves: LongWaves) -> list[Dashpot
     chosen = resolve_nodes(structure, nodes, "nodes")
     impedance = waves.impedance
     axis = np.array(waves.axis) / np.linalg.norm(waves.axis)
-    motions = _rigid(
-        structure.nodes[chosen], axis, np.array(waves.point), turns=len(impedance) == 2
-    )
+    points, center = structure.nodes[chosen], np.array(waves.point)
+    motions = _rigid(points, axis, center, turns=len(impedance) == 2)
     arms = np.linalg.norm(motions[:, :, -1], axis=1)
     if arms.min() <= ON_AXIS * arms.max():
         raise InputError(

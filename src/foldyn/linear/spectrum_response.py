@@ -151,9 +151,8 @@ def spectrum_response(
         _warn_of_mass(axis, shock.covered)
     frequency = np.sqrt(modes.basis.values[modes.basis.inertia > 0.0].clip(0.0)) / TURN
     warn_beyond(case.structure, frequency[frequency <= top], "mode", linear=True)
-    found = {
-        name: {"peak": np.sqrt(squared_parts(name, own.clip(0.0)))} for name, own in squares.items()
-    }
+    summed = {name: squared_parts(name, own.clip(0.0)) for name, own in squares.items()}
+    found = {name: {"peak": np.sqrt(own)} for name, own in summed.items()}
     facts["wall_seconds"] = time.perf_counter() - began
     return random_dataset(
         case, system.displacement, found, facts, np.zeros(0), parts.coordinates, of="spectrum"
