@@ -7,16 +7,13 @@ files. Source of the format: fold's src/oripa.coffee (https://github.com/edemain
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from xml.etree.ElementTree import Element
 
 from foldyn.errors import InputError
 from foldyn.formats.cp import LETTERS
 from foldyn.formats.drawing import Drawing, coordinate
 from foldyn.formats.xml_text import from_xml, local
 from foldyn.values import show
-
-if TYPE_CHECKING:
-    from xml.etree.ElementTree import Element
 
 _COORDINATES = ("x0", "y0", "x1", "y1")
 

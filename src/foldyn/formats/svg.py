@@ -15,7 +15,7 @@ from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from html import escape
-from typing import TYPE_CHECKING
+from xml.etree.ElementTree import Element
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,9 +32,6 @@ from foldyn.formats.writers import flat_points, letters
 from foldyn.formats.xml_text import DEEPEST, from_xml, local
 from foldyn.patterns import Pattern
 from foldyn.values import LONGEST
-
-if TYPE_CHECKING:
-    from xml.etree.ElementTree import Element
 
 _GROUPS = ("svg", "g", "a", "switch")
 _NOT_DRAWN = ("text", "image", "foreignObject")
