@@ -286,13 +286,10 @@ class Shell(Discretized):
             own, at = np.flatnonzero(panel == number), points.panel == number
             found = recovery(points.position[at], x[own], points.axes[number], rigid[own])
             sides = (3 * own[:, None] + np.arange(3)).ravel()
-            put = sparse.csr_array(
-                (np.ones(len(sides)), (np.arange(len(sides)), sides)), (len(sides), panel.size * 3)
-            )
+            put = sparse.eye_array(panel.size * 3, format="csr")[sides]
             parts.append([each @ put for each in found])
-        return Recovery(
-            *(sparse.csr_array(sparse.vstack(each)) for each in zip(*parts, strict=True))
-        )
+        whole = (sparse.csr_array(sparse.vstack(each)) for each in zip(*parts, strict=True))
+        return Recovery(*whole)
 
     @cached_property
     def _stretching(self) -> NDArray:
