@@ -214,12 +214,10 @@ def _primitives(content: Content, case: Case) -> tuple[list[dict[str, Any]], lis
     """Panels, and the lines of each kind, with their materials."""
     structure = case.structure
     paper = {"baseColorFactor": linear(PAPER), "metallicFactor": 0.0, "roughnessFactor": 0.9}
-    primitives = [
-        {"mode": TRIANGLES, "material": 0, "indices": content.indices(structure.triangles)}
-    ]
-    materials: list[dict[str, Any]] = [
-        {"name": "panels", "doubleSided": True, "pbrMetallicRoughness": paper}
-    ]
+    panels = {"name": "panels", "doubleSided": True, "pbrMetallicRoughness": paper}
+    materials: list[dict[str, Any]] = [panels]
+    faces = content.indices(structure.triangles)
+    primitives = [{"mode": TRIANGLES, "material": 0, "indices": faces}]
     pairs, kind, *_ = edge_pieces(structure.pattern, structure.nodes, structure.edge_nodes)
     for row, letter in enumerate(KINDS):
         if not (kind == row).any():
@@ -227,13 +225,8 @@ def _primitives(content: Content, case: Case) -> tuple[list[dict[str, Any]], lis
         color = {"baseColorFactor": linear(CREASES.get(letter, BLACK)), "metallicFactor": 0.0}
         lines = content.indices(pairs[kind == row])
         primitives.append({"mode": LINES, "material": len(materials), "indices": lines})
-        materials.append(
-            {
-                "name": CREASE_NAMES.get(letter, "boundary"),
-                "pbrMetallicRoughness": color,
-                "extensions": {"KHR_materials_unlit": {}},
-            }
-        )
+        line = {"name": CREASE_NAMES.get(letter, "boundary"), "pbrMetallicRoughness": color}
+        materials.append(line | {"extensions": {"KHR_materials_unlit": {}}})
     return primitives, materials
 
 
