@@ -221,10 +221,8 @@ def _joined(
         return np.asarray(values[0]) if vary is None else np.stack(values)
 
     values = {name: over([one[name].values for one in found]) for name in BANDS if name in first}
-    parts = [
-        one.attrs["gaps"].assign(state=("gap", np.full(one.attrs["gaps"].sizes["gap"], k)))
-        for k, one in enumerate(found)
-    ]
+    every = [one.attrs["gaps"] for one in found]
+    parts = [own.assign(state=("gap", np.full(own.sizes["gap"], k))) for k, own in enumerate(every)]
     gaps = {
         name: np.concatenate([one[name.removeprefix("gap_")].values for one in parts])
         for name in GAPS

@@ -74,9 +74,8 @@ class EffectiveAnalysis(Analysis):
             seconds = result.attrs["wall_seconds"]
             return f"  {counted(result.sizes['state'], 'state')}, {seconds:.1f} s"
         shown = ("modulus", "poissons_ratio", "axial_stiffness", "torsional_stiffness")
-        numbers = [
-            f"{name.replace('_', ' ')} {_listed(result[name])}" for name in shown if name in result
-        ]
+        known = [name for name in shown if name in result]
+        numbers = [f"{name.replace('_', ' ')} {_listed(result[name])}" for name in known]
         return f"  {'; '.join(numbers)}, {result.attrs['wall_seconds']:.1f} s"
 
     @staticmethod
