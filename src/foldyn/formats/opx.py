@@ -37,12 +37,8 @@ def read(text: str) -> Drawing:
         The text is not OPX, or a line is invalid; the message names it.
     """
     root = from_xml(text, "an OPX file")
-    objects = [
-        element
-        for element in root.iter()
-        if local(element) == "object"
-        and element.get("class", "").rpartition(".")[2] == "OriLineProxy"
-    ]
+    objects = [element for element in root.iter() if local(element) == "object"]
+    objects = [one for one in objects if one.get("class", "").rpartition(".")[2] == "OriLineProxy"]
     if not objects:
         raise InputError(": there are none (of the class OriLineProxy)", "lines")
     letters: list[str] = []

@@ -118,11 +118,8 @@ def areas(panels: Panels) -> NDArray[np.float64]:
 
 def parts(panels: Panels) -> NDArray[np.int64]:
     """Part number of each panel; edges that are not cuts join panels to a part."""
-    pairs = [
-        (at[0], at[1])
-        for edge, at in panels.sides().items()
-        if len(at) == 2 and panels.letters.get(edge) != "C"
-    ]
+    letters, sides = panels.letters, panels.sides()
+    pairs = [at for edge, at in sides.items() if len(at) == 2 and letters.get(edge) != "C"]
     return components(pairs, len(panels.faces))
 
 
