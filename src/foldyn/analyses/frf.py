@@ -285,16 +285,12 @@ MOST_REASONS = 6
 
 def _coherence(results: ByRule, nodes: list[int], axis: str) -> list[Section]:
     """Coherence of estimated responses, for a page without figures."""
-    curves = [
-        Curve(
-            f"node {node}" if len(results) == 1 else f"node {node}, {rule}",
-            response["frequency"].values,
-            response["coherence"].sel(node=node, axis=axis[-1]).values,
-        )
-        for rule, response in results.items()
-        if "coherence" in response
-        for node in nodes
-    ]
+    curves = []
+    for rule, response in results.items():
+        for node in nodes if "coherence" in response else ():
+            label = f"node {node}" if len(results) == 1 else f"node {node}, {rule}"
+            values = response["coherence"].sel(node=node, axis=axis[-1]).values
+            curves.append(Curve(label, response["frequency"].values, values))
     if not curves:
         return []
     chart = Chart("frequency (Hz)", "coherence", curves)
