@@ -218,11 +218,9 @@ def absorbing_end(case: Case, nodes: Nodes, *, waves: LongWaves) -> list[Dashpot
     for node, motion in zip(chosen.tolist(), motions, strict=True):
         inverse = np.linalg.pinv(motion)
         coefficients, ways = np.linalg.eigh(inverse.T @ (impedance / len(chosen)) @ inverse)
-        found += [
-            Dashpot(float(c), nodes=[node], direction=tuple(way.tolist()))
-            for c, way in zip(coefficients, ways.T, strict=True)
-            if c > NEGLIGIBLE * coefficients[-1]
-        ]
+        for c, way in zip(coefficients.tolist(), ways.T.tolist(), strict=True):
+            if c > NEGLIGIBLE * coefficients[-1]:
+                found.append(Dashpot(c, nodes=[node], direction=tuple(way)))
     return found
 
 

@@ -108,12 +108,11 @@ def relaxed(
 
 def _given(cell: UnitCell, motions: Any) -> tuple[Screw, ...]:
     """The final motions."""
-    given = [
-        motion
-        if isinstance(motion, Screw)
-        else translation(vector(f"motions[{k}]", motion, nonzero=True))
-        for k, motion in enumerate(listed("motions", motions, "screws or vectors (m)"))
-    ]
+    given = []
+    for k, motion in enumerate(listed("motions", motions, "screws or vectors (m)")):
+        if not isinstance(motion, Screw):
+            motion = translation(vector(f"motions[{k}]", motion, nonzero=True))
+        given.append(motion)
     if len(given) != cell.dimensions:
         raise InputError(f": {len(given)} of them; the cell has {cell.dimensions}", "motions")
     check_commuting(cell.case.structure.nodes, given, cell.near, "motions")

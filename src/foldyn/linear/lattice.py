@@ -8,6 +8,7 @@ directions of hinges, signs of rotations, ties.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, NamedTuple
 
@@ -135,17 +136,11 @@ class Lattice:
 
     def _beside_pairs(self, panels: set[Panel]) -> set[Panel]:
         """All panels at junctions at which there are two of the given panels."""
-        at: dict[tuple[Kind, Step], int] = {}
+        at: Counter[tuple[Kind, Step]] = Counter()
         for step, f in panels:
-            for edge in self._edges(f):
-                place = edge.kind, plus(step, edge.step)
-                at[place] = at.get(place, 0) + 1
-        return {
-            (minus(step, cell), f)
-            for (kind, step), count in at.items()
-            if count == 2
-            for f, cell in self.beside[kind]
-        }
+            at.update((edge.kind, plus(step, edge.step)) for edge in self._edges(f))
+        twice = [place for place, count in at.items() if count == 2]
+        return {(minus(step, cell), f) for kind, step in twice for f, cell in self.beside[kind]}
 
     def _across(self, step: Step, f: int) -> Iterator[Panel]:
         """Panels across the edges of a panel."""

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -144,10 +145,8 @@ class CellReach:
     def ties(self) -> Hops:
         """Constraints (k, m) of one cell: constraints whose first cell is cell 0."""
         rows = self.patch.case.constraints.rows
-        first = [
-            min(map(tuple, self.steps[self.number[rows.indices[a:b]]].tolist()))
-            for a, b in zip(rows.indptr[:-1], rows.indptr[1:], strict=True)
-        ]
+        steps = [self.steps[self.number[rows.indices[a:b]]] for a, b in pairwise(rows.indptr)]
+        first = [min(map(tuple, own.tolist())) for own in steps]
         kept = [k for k, step in enumerate(first) if not any(step)]
         size = rows.shape[1]
         own = sparse.coo_array(rows[kept] @ self._frames[:size, :size])
@@ -292,16 +291,12 @@ def linearize_cell(
     damping = sparse.csr_array(
         damping_matrix(case, q, True) + case.rayleigh.matrix(mass, damped_tangent(case, tangent))
     )
-    bloch = Bloch(
-        reach.steps,
-        **{
-            name: hermitian(reach.hops(own), reach.steps, name, patch.first)
-            for name, own in {"stiffness": stiffness, "mass": mass, "damping": damping}.items()
-        },
-        ties=reach.ties,
-        hidden=reach.hidden,
-        held=reach.held,
-    )
+    parts = {"stiffness": stiffness, "mass": mass, "damping": damping}
+    hopping = {
+        name: hermitian(reach.hops(own), reach.steps, name, patch.first)
+        for name, own in parts.items()
+    }
+    bloch = Bloch(reach.steps, **hopping, ties=reach.ties, hidden=reach.hidden, held=reach.held)
     residual = _residual(reach, q)
     if residual > BALANCED:
         _warn(

@@ -222,10 +222,8 @@ class _Shock:
 
     def square(self, amounts: Amounts) -> NDArray[np.float64]:
         """Squares (k,) of the largest values of a quantity."""
-        largest = sum(
-            self._columns(power, rows.shape[1]) @ rows.T
-            for power, rows in zip(amounts.powers, amounts.rows, strict=True)
-        )
+        each = zip(amounts.powers, amounts.rows, strict=True)
+        largest = sum(self._columns(power, rows.shape[1]) @ rows.T for power, rows in each)
         return np.einsum("ip,ij,jp->p", largest, self._alike, largest)
 
     def _columns(self, power: int, size: int) -> NDArray[np.float64]:

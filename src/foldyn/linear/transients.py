@@ -313,13 +313,6 @@ def respond(
             "frequency-response.md#responses-from-simulated-motions",
         )
     estimate = frequency_response(drive, responses, dt=record.interval, estimator=estimator)
-    return Answer(
-        estimate.response[record.lines],
-        {"coherence": estimate.coherence[record.lines]},
-        {
-            "record": record.duration,
-            "interval": record.interval,
-            "window_rate": rate,
-            "left_at_end": left,
-        },
-    )
+    coherence = {"coherence": estimate.coherence[record.lines]}
+    facts = {"record": record.duration, "interval": record.interval, "window_rate": rate}
+    return Answer(estimate.response[record.lines], coherence, facts | {"left_at_end": left})

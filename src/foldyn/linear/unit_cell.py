@@ -224,11 +224,10 @@ class UnitCell:
             motions.append(motion)
         if not motions:
             raise InputError(": the pattern closes on itself, and has no period", "case")
-        pairs = [
-            (v, w, tuple(int(j == k) for j in range(len(motions))))
-            for rows, k in found
-            for v, w in rows.tolist()
-        ]
+        pairs = []
+        for rows, k in found:
+            step = tuple(int(j == k) for j in range(len(motions)))
+            pairs += [(v, w, step) for v, w in rows.tolist()]
         return tuple(motions), pairs
 
     @property
