@@ -78,10 +78,8 @@ class Content:
         buffers = [{"byteLength": len(self.binary)}]
         text = json.dumps({**self.document, "buffers": buffers}, separators=(",", ":")).encode()
         text += b" " * (-len(text) % 4)
-        chunks = b"".join(
-            struct.pack("<I4s", len(chunk), kind) + chunk
-            for kind, chunk in ((b"JSON", text), (b"BIN\0", bytes(self.binary)))
-        )
+        parts = (b"JSON", text), (b"BIN\0", bytes(self.binary))
+        chunks = b"".join(struct.pack("<I4s", len(part), kind) + part for kind, part in parts)
         return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
 
 
@@ -183,13 +181,10 @@ def _content(case: Case, shapes: Shapes, animations: list[Animation]) -> Content
     """The scene: one mesh of panels and lines."""
     content, name = Content(), case.structure.pattern.name or "sheet"
     primitives, materials = _primitives(content, case)
-    shared = {
-        "attributes": {"POSITION": content.add(shapes.nodes, "nodes")},
-        "targets": [
-            {"POSITION": content.add(moved, title)}
-            for moved, title in zip(shapes.displacement, shapes.titles, strict=True)
-        ],
-    }
+    nodes = {"POSITION": content.add(shapes.nodes, "nodes")}
+    moved = zip(shapes.displacement, shapes.titles, strict=True)
+    targets = [{"POSITION": content.add(each, title)} for each, title in moved]
+    shared = {"attributes": nodes, "targets": targets}
     content.document |= {
         "asset": {"version": "2.0", "generator": f"Foldyn {__version__}"},
         "extensionsUsed": ["KHR_materials_unlit"],
