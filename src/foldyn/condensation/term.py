@@ -176,12 +176,8 @@ class SuperelementsTerm(SheetTerm):
     def compiled(self, part: Any, kept: Any, group: int) -> CompiledTerm:
         """See `Term`."""
         turns, moment = self.crease_turns, self._slope * self._changed
-        own = _Context(
-            matrix(self._panels),
-            matrix(self._folds),
-            turns.mean.T @ moment,
-            0.5 * float(moment @ self._changed),
-        )
+        energy = 0.5 * float(moment @ self._changed)
+        own = _Context(matrix(self._panels), matrix(self._folds), turns.mean.T @ moment, energy)
         return CompiledTerm(Context(own), {FORCES: _forces, ENERGIES: _energies})
 
     @cached_property
