@@ -373,11 +373,9 @@ class KeptEnds:
         """Ends of motions from some starts, stored or computed."""
         if self._folder is None:
             return compute()
-        numbers = [
-            part
-            for one in starts
-            for part in (one.displacement, one.velocity, one.origin and one.origin.displacement)
-        ]
+        numbers = []
+        for one in starts:
+            numbers += [one.displacement, one.velocity, one.origin and one.origin.displacement]
         about = json.loads(json.dumps({**self._about, "starts": _digest(numbers)}, default=str))
         name = name_of(about)
         file = self._folder / f"{name}.npz"

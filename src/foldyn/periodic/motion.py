@@ -272,12 +272,10 @@ def still_case(case: Case) -> Case:
             supports.append(replace(support, value=0.0, history=Constant()))
     contact = case.contact
     if contact is not None:
-        planes = [
-            plane
-            if plane.history in (None, Constant())
-            else replace(plane, motion=None, history=None)
-            for plane in contact.planes
-        ]
+        planes = []
+        for plane in contact.planes:
+            stands = plane.history in (None, Constant())
+            planes.append(plane if stands else replace(plane, motion=None, history=None))
         contact = replace(contact, planes=planes)
     return case.altered(loads=loads, supports=supports, contact=contact)
 
