@@ -309,19 +309,6 @@ class Superelements(Discretized):
         return self.fold_stiffness * law.slope(self.pattern.dihedrals, self.fold_rest)
 
 
-def _checked_law(given: Any) -> Any:
-    """Laws of creases, each with a slope at rest; see `laws_given`."""
-    given, laws = laws_given(given)
-    for law in laws:
-        if isinstance(law.elastic, Superlinear):
-            raise InputError(
-                f" = {law.name!r}: has no slope at rest, which superelements need; take "
-                '"linear" or "enhanced"',
-                "fold_law",
-            )
-    return given
-
-
 def superelements(
     pattern: Pattern | Patterned,
     sheet: Sheet,
@@ -382,7 +369,14 @@ def superelements(
     level = whole("level", level, least=1, most=len(LEVELS))
     if divisions is not None:
         divisions = whole("divisions", divisions, least=4)
-    fold_law = _checked_law(fold_law)
+    fold_law, laws = laws_given(fold_law)
+    for law in laws:
+        if isinstance(law.elastic, Superlinear):
+            raise InputError(
+                f" = {law.name!r}: has no slope at rest, which superelements need; take "
+                '"linear" or "enhanced"',
+                "fold_law",
+            )
     calibration.check_sheet(sheet, pattern)
     if sheet.density is None:
         raise InputError("sheet: density is missing: give it (kg/m3), the panels' mass needs it")
