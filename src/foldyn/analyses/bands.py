@@ -223,10 +223,8 @@ def _joined(
     values = {name: over([one[name].values for one in found]) for name in BANDS if name in first}
     every = [one.attrs["gaps"] for one in found]
     parts = [own.assign(state=("gap", np.full(own.sizes["gap"], k))) for k, own in enumerate(every)]
-    gaps = {
-        name: np.concatenate([one[name.removeprefix("gap_")].values for one in parts])
-        for name in GAPS
-    }
+    own = {name: name.removeprefix("gap_") for name in GAPS}
+    gaps = {name: np.concatenate([one[key].values for one in parts]) for name, key in own.items()}
     along: dict[str, Any] = {"band": ("band", first["band"].values, {"long_name": "band"})}
     along |= {name: first[name].variable for name in COORDINATES if name in first.coords}
     if vary is not None:
