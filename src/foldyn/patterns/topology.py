@@ -191,7 +191,7 @@ def build_topology(faces: Faces, vertices: NDArray, welds: Any = ()) -> Topology
     order = np.argsort(edge, kind="stable")
     pairs, edge = pairs[order], edge[order]
     ways = np.where(forward[pairs], 1, -1) * np.array([1, -1])
-    on = welded[edge]
+    on = welded[edge]  # rows of welds
     creases, joined = ((edges[edge[rows]], owner[pairs[rows]], ways[rows]) for rows in (~on, on))
     flipped = tuple(bool(turn) for turn in reverse)
     return Topology(wound, flipped, edges, edges[count == 1], *creases, *joined)
