@@ -52,9 +52,8 @@ class Condensing:
         columns = np.repeat(np.arange(size), [len(own) for own in below])
         keys = columns * size + rows
         self.places = np.searchsorted(keys, column * size + row)
-        self._block = np.searchsorted(
-            keys, np.minimum.outer(last, last) * size + np.maximum.outer(last, last)
-        )
+        low, high = np.minimum.outer(last, last), np.maximum.outer(last, last)
+        self._block = np.searchsorted(keys, low * size + high)
         pointers = np.searchsorted(columns, np.arange(size + 1))
         entry = np.flatnonzero((rows > columns) & (columns < free))
         entry = entry[np.argsort(rows[entry], kind="stable")]

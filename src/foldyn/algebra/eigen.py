@@ -152,8 +152,7 @@ def lowest(pencil: Pencil, count: int, known: NDArray, verify: bool = True) -> S
                 f" = {count}: ask for fewer than half of the modes of {pencil.size} free dofs",
                 "count",
             )
-        values, shapes = _all(pencil, known)
-        values, shapes = _sorted(pencil, values, shapes, known)
+        values, shapes = _sorted(pencil, *_all(pencil, known), known)
         return Spectrum(values[:count], shapes[:, :count], float("nan"), count, 0)
     try:
         return _sparse(pencil, count, known, verify)
@@ -235,9 +234,7 @@ def _lanczos(
         weight = mass
         if isinstance(mass, Squared):
             weight = LinearOperator((size, size), matvec=mass.__matmul__, dtype=float)
-        _, shapes = eigsh(
-            pencil.stiffness, k=count, M=weight, sigma=shift, OPinv=operator, v0=start
-        )
+        _, shapes = eigsh(pencil.stiffness, count, weight, sigma=shift, OPinv=operator, v0=start)
     except ArpackNoConvergence as error:
         raise ComputationError(
             f"modes: {len(error.eigenvalues)} of {count} modes converged; ask for fewer, or for "

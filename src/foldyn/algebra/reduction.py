@@ -51,10 +51,9 @@ class Reduction:
 
     def _prepare(self, matrix: sparse.csr_array) -> None:
         self._pattern = (matrix.indptr.copy(), matrix.indices.copy())
-        block = sparse.csr_array(
-            (np.arange(matrix.nnz, dtype=np.int64), matrix.indices, matrix.indptr),
-            shape=matrix.shape,
-        )[self.free][:, self.free].tocsr()
+        entries = np.arange(matrix.nnz, dtype=np.int64), matrix.indices, matrix.indptr
+        numbered = sparse.csr_array(entries, shape=matrix.shape)
+        block = numbered[self.free][:, self.free].tocsr()
         block.sort_indices()
         self._take, self._indices, self._indptr = block.data, block.indices, block.indptr
         self._shape = block.shape

@@ -62,9 +62,8 @@ def factorize(matrix: sparse.csc_array, symmetric: bool = True, pivot: float = 0
     symmetric : keep pivots on the diagonal, except a pivot that is smaller than `pivot` times the
     largest entry of its column.
     """
-    mode = dict(
-        permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=pivot, options={"SymmetricMode": True}
-    )
+    options = {"SymmetricMode": True}
+    mode = dict(permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=pivot, options=options)
     try:
         return splu(matrix, **(mode if symmetric else {}))
     except RuntimeError as error:  # "Factor is exactly singular"

@@ -221,14 +221,10 @@ def _joined(
         return np.asarray(values[0]) if vary is None else np.stack(values)
 
     values = {name: over([one[name].values for one in found]) for name in BANDS if name in first}
-    parts = [
-        one.attrs["gaps"].assign(state=("gap", np.full(one.attrs["gaps"].sizes["gap"], k)))
-        for k, one in enumerate(found)
-    ]
-    gaps = {
-        name: np.concatenate([one[name.removeprefix("gap_")].values for one in parts])
-        for name in GAPS
-    }
+    every = [one.attrs["gaps"] for one in found]
+    parts = [own.assign(state=("gap", np.full(own.sizes["gap"], k))) for k, own in enumerate(every)]
+    own = {name: name.removeprefix("gap_") for name in GAPS}
+    gaps = {name: np.concatenate([one[key].values for one in parts]) for name, key in own.items()}
     along: dict[str, Any] = {"band": ("band", first["band"].values, {"long_name": "band"})}
     along |= {name: first[name].variable for name in COORDINATES if name in first.coords}
     if vary is not None:

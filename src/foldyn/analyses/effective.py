@@ -74,9 +74,8 @@ class EffectiveAnalysis(Analysis):
             seconds = result.attrs["wall_seconds"]
             return f"  {counted(result.sizes['state'], 'state')}, {seconds:.1f} s"
         shown = ("modulus", "poissons_ratio", "axial_stiffness", "torsional_stiffness")
-        numbers = [
-            f"{name.replace('_', ' ')} {_listed(result[name])}" for name in shown if name in result
-        ]
+        known = [name for name in shown if name in result]
+        numbers = [f"{name.replace('_', ' ')} {_listed(result[name])}" for name in known]
         return f"  {'; '.join(numbers)}, {result.attrs['wall_seconds']:.1f} s"
 
     @staticmethod
@@ -115,15 +114,11 @@ class EffectiveAnalysis(Analysis):
 def _joined(case: Case, vary: Varied, found: Sequence[xarray.Dataset]) -> xarray.Dataset:
     """Properties in all states as one result."""
     first, own = found[0], result_dataset("effective", case, {}, {}, {})
-    values = {
-        str(name): (
-            ("state", *one.dims),
-            np.stack([each[name].values for each in found]),
-            one.attrs,
-        )
-        for name, one in first.data_vars.items()
-        if name not in own
-    }
+    values: dict[str, Any] = {}
+    for name, one in first.data_vars.items():
+        if name not in own:
+            stacked = np.stack([each[name].values for each in found])
+            values[str(name)] = ("state", *one.dims), stacked, one.attrs
     along: dict[str, Any] = {
         str(name): one.variable for name, one in first.coords.items() if name not in own.coords
     }
@@ -137,14 +132,11 @@ def _joined(case: Case, vary: Varied, found: Sequence[xarray.Dataset]) -> xarray
 def _by_state(result: xarray.Dataset) -> Table:
     """The short variables, a row for each state."""
     shown = [str(name) for name in BY_STATE if name in result]
-    rows = [
-        [
-            cell(float(state)),
-            *(_listed(result[name].sel(state=state)) for name in shown),
-            "yes" if result["stable"].sel(state=state) else "no",
-        ]
-        for state in result["state"].values
-    ]
+    rows = []
+    for state in result["state"].values:
+        one = result.sel(state=state)
+        stable = "yes" if one["stable"] else "no"
+        rows.append([cell(float(state)), *(_listed(one[name]) for name in shown), stable])
     units = [f"{name.replace('_', ' ')} ({result[name].units})" for name in shown]
     names = [result["state"].attrs["long_name"], *units, "stable"]
     return Table(names, rows, "Properties in each state")

@@ -120,12 +120,8 @@ class DriveOf(PartOf):
         return super()._made(name, value, folder)
 
 
-DRIVE = DriveOf(
-    (Force, BaseMotion),
-    "drive",
-    "nodes and force, or base (the axis of a base that moves)",
-    history=NO_HISTORY,
-)
+ASKED = "nodes and force, or base (the axis of a base that moves)"
+DRIVE = DriveOf((Force, BaseMotion), "drive", ASKED, history=NO_HISTORY)
 
 
 class FrfOutput(ShownSection):
@@ -195,10 +191,8 @@ class FrfAnalysis(Analysis):
     def of(cls, schema: Any, case: Case) -> Self:
         """See `Analysis`."""
         section = schema.analysis
-        given: dict[str, Any] = {
-            key: getattr(section, key)
-            for key in ("frequencies", "method", "secant", "amplitude", "check_model")
-        }
+        keys = "frequencies", "method", "secant", "amplitude", "check_model"
+        given: dict[str, Any] = {key: getattr(section, key) for key in keys}
         given["state"] = None if section.state == "rest" else section.state
         return cls({**given, **section.options(), "drive": schema.drive})
 
@@ -252,9 +246,8 @@ class FrfAnalysis(Analysis):
         parts = (
             "Magnitude, phase and coherence" if "coherence" in response else "Magnitude and phase"
         )
-        yield from album.structure(
-            _driven(case, drive), "The pattern with its nodes, supports and drive."
-        )
+        caption = "The pattern with its nodes, supports and drive."
+        yield from album.structure(_driven(case, drive), caption)
         yield Heading("The response")
         yield from album.figure(
             "response",
@@ -268,16 +261,15 @@ class FrfAnalysis(Analysis):
             for rule, result in results.items()
             for node in nodes
         }
-        if shown is not None and any(np.isfinite(p.damping_ratio) for p in peaks[first, nodes[0]]):
+        own = () if shown is None else peaks[first, nodes[0]]
+        if any(np.isfinite(peak.damping_ratio) for peak in own):
             rule = f" with mass rule {first}" if len(results) > 1 else ""
             yield from album.figure(
                 "nyquist",
                 f"Mobility of node {nodes[0]} along {axis}{rule} around its peaks, in the complex "
                 "plane: a mode makes a circle, from which its natural frequency and damping are "
                 "found. Points that leave the circle show what other modes or nonlinearity add.",
-                lambda: plots.plot_nyquist(
-                    response, nodes[0], axis=axis, peaks=peaks[first, nodes[0]]
-                ),
+                lambda: plots.plot_nyquist(response, nodes[0], axis=axis, peaks=own),
             )
         yield Heading("The numbers")
         yield _peaks(peaks, quantity, axis, len(results) > 1)
@@ -293,16 +285,12 @@ MOST_REASONS = 6
 
 def _coherence(results: ByRule, nodes: list[int], axis: str) -> list[Section]:
     """Coherence of estimated responses, for a page without figures."""
-    curves = [
-        Curve(
-            f"node {node}" if len(results) == 1 else f"node {node}, {rule}",
-            response["frequency"].values,
-            response["coherence"].sel(node=node, axis=axis[-1]).values,
-        )
-        for rule, response in results.items()
-        if "coherence" in response
-        for node in nodes
-    ]
+    curves = []
+    for rule, response in results.items():
+        for node in nodes if "coherence" in response else ():
+            label = f"node {node}" if len(results) == 1 else f"node {node}, {rule}"
+            values = response["coherence"].sel(node=node, axis=axis[-1]).values
+            curves.append(Curve(label, response["frequency"].values, values))
     if not curves:
         return []
     chart = Chart("frequency (Hz)", "coherence", curves)

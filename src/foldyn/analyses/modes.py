@@ -78,11 +78,8 @@ class ModesAnalysis(Vibration):
         """Frequencies and effort."""
         rigid, unstable = result["rigid"].values, result["eigenvalue"].values < 0.0
         elastic = result["frequency"].values[~rigid & ~unstable]
-        special = [
-            f"{int(chosen.sum())} {what}"
-            for chosen, what in ((rigid, "rigid"), (unstable, "unstable"))
-            if chosen.any()
-        ]
+        kinds = (rigid, "rigid"), (unstable, "unstable")
+        special = [f"{int(own.sum())} {what}" for own, what in kinds if own.any()]
         reach = f", {elastic[0]:.4g} to {elastic[-1]:.4g} Hz" if len(elastic) else ""
         if len(elastic) and "frequency_error" in result:
             off = (result["frequency_error"].values[~rigid & ~unstable] / elastic).max()
@@ -169,9 +166,8 @@ def _compared(results: ByRule, same: Mapping[str, NDArray]) -> Table:
     """Table of corresponding modes with other mass rules."""
     first, modes = next(iter(results.items()))
     header = ["mode", f"{first} (Hz)"]
-    rows: list[list[Any]] = [
-        [number, _frequency(modes, k)] for k, number in enumerate(modes["mode"].values.tolist())
-    ]
+    numbers = modes["mode"].values.tolist()
+    rows: list[list[Any]] = [[mode, _frequency(modes, k)] for k, mode in enumerate(numbers)]
     for rule, matrix in same.items():
         header += [f"{rule} (Hz)", "MAC"]
         pairs = pair_modes(np.nan_to_num(matrix))

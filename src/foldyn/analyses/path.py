@@ -313,11 +313,9 @@ def _landscape(
     case: Case, path: xarray.Dataset, moved: tuple[list[int], str] | None
 ) -> Landscape | None:
     """Energy landscape of a path whose load or reaction falls somewhere; otherwise None."""
-    driven = (
-        path["load_factor"].values
-        if moved is None
-        else plots.total_reaction(path, moved[0], direction=moved[1])
-    )
+    driven = path["load_factor"].values
+    if moved is not None:
+        driven = plots.total_reaction(path, moved[0], direction=moved[1])
     if not (np.diff(driven) < 0.0).any():
         return None
     try:

@@ -6,12 +6,13 @@ import re
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, is_dataclass
 from datetime import datetime
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import xarray
 
 from foldyn.arguments import arguments
-from foldyn.cases import Contact, History
+from foldyn.cases import Case, Contact, History
 from foldyn.cases.units import units
 from foldyn.linear.compared import percent
 from foldyn.linear.reference import NO_LIMIT
@@ -21,11 +22,6 @@ from foldyn.report.album import ByRule
 from foldyn.report.sections import Heading, Listing, Section, Table
 from foldyn.structures import PanelSheet, Ply
 from foldyn.values import plain
-
-if TYPE_CHECKING:
-    import xarray
-
-    from foldyn.cases import Case
 
 MOST_LISTED = 24
 """Largest number of entries of a list that are written individually."""

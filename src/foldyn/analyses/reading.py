@@ -186,11 +186,10 @@ def case_of_document(
     with within("", path):
         analysis = kind.of(schema, case)
         chosen = getattr(schema.output, "nodes", None)
-        nodes = (
-            analysis.shown(case)
-            if chosen is None
-            else resolve_nodes(case.structure, chosen, "output.nodes")
-        )
+        if chosen is None:
+            nodes = analysis.shown(case)
+        else:
+            nodes = resolve_nodes(case.structure, chosen, "output.nodes")
     shown = {k: v for k, v in schema.output.values().items() if k not in ("nodes", *SAMPLING)}
     case_file = CaseFile(
         path, schema.title, pattern, sheet, choice, masses, analysis,
@@ -289,15 +288,14 @@ def _facets(pattern: Pattern, table: Mapping[str, Any]) -> Pattern:
 
 def _imperfect(pattern: Pattern, section: ImperfectionSection, folder: Path) -> Pattern:
     """The pattern with the imperfection of a section."""
+    size = section.amplitude
     if section.file is None:
-        return imperfect(
-            pattern, section.amplitude, correlation=section.correlation, seed=section.seed
-        )
+        return imperfect(pattern, size, correlation=section.correlation, seed=section.seed)
     place = f"file = {show(section.file)}"
     with within(f"{place}: "):
         shapes = load(folder / section.file)
     with renamed({"shapes": place}):
-        return imperfect(pattern, section.amplitude, shapes=shapes, modes=section.modes)
+        return imperfect(pattern, size, shapes=shapes, modes=section.modes)
 
 
 def _thick(pattern: Pattern, sheet: Sheet, offset: Any) -> Pattern:

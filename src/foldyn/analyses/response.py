@@ -87,9 +87,8 @@ class ResponseAnalysis(Analysis):
     def sections(case_file: CaseFile, results: ByRule, album: Album) -> Iterator[Section]:
         """See `Analysis`."""
         first = next(iter(results))
-        yield from album.structure(
-            case_file.case(first), "The pattern with its nodes, supports and loads."
-        )
+        caption = "The pattern with its nodes, supports and loads."
+        yield from album.structure(case_file.case(first), caption)
         yield Heading("The curve")
         curves = results if len(results) > 1 else results[first]
         yield from album.figure(

@@ -144,9 +144,8 @@ def still(name: str, value: Any, why: str) -> Any:
 
 def _per_crease(name: str, value: Any) -> Any:
     """Return a number for all creases, a list with one for each, or a table by name."""
-    return per_crease(
-        name, value if isinstance(value, Mapping) else number_or_list(name, value, "crease")
-    )
+    given = value if isinstance(value, Mapping) else number_or_list(name, value, "crease")
+    return per_crease(name, given)
 
 
 def _folds(name: str, value: Any) -> Any:
@@ -238,11 +237,8 @@ class ModelSection(Section):
     def agree(self) -> None:
         """Refuse keys of other models."""
         model = MODELS[self.kind or BARS_AND_HINGES]
-        strange = [
-            key
-            for key in arguments(type(self))
-            if key in self.stated - {"kind"} and key not in model.keys
-        ]
+        beyond = self.stated - {"kind", *model.keys}
+        strange = [key for key in arguments(type(self)) if key in beyond]
         if strange:
             owner = next(kind for kind, other in MODELS.items() if strange[0] in other.keys)
             raise InputError(

@@ -57,8 +57,7 @@ def _table(found: xarray.Dataset) -> Table:
         rows.append(["moment of a crease (N)", cell(float(moment.max())), f"crease {crease}", when])
     if "von_mises" in found and case_of(found).structure.sheet.has_strength:
         margin = margins(found).attrs
-        rows.append(
-            ["least margin of a panel", cell(margin["least_margin"]), margin["least_where"], ""]
-        )
+        least = cell(margin["least_margin"])
+        rows.append(["least margin of a panel", least, margin["least_where"], ""])
     state = "time (s)" if along == "time" else "load factor"
     return Table(["", "largest", "where", state], rows, "Stresses, moments and margins.")

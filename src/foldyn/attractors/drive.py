@@ -42,9 +42,8 @@ def drive_frequency(case: Case) -> float:
     InputError
         The other frequencies are not multiples of the lowest, so that the drive has no period.
     """
-    return lowest_frequency(
-        [part.history.frequency for _, part in _parts(case) if _is_driven(part)]
-    )
+    driven = [part for _, part in _parts(case) if _is_driven(part)]
+    return lowest_frequency([part.history.frequency for part in driven])
 
 
 def lowest_frequency(frequencies: Sequence[float]) -> float:
@@ -125,9 +124,8 @@ def _altered(case: Case, change: Callable[[Any], Any]) -> Case:
     if contact is not None:
         contact = replace(contact, planes=changed(contact.planes))
     air = case.air if case.air is None else changed([case.air])[0]
-    return case.altered(
-        loads=changed(case.loads), supports=changed(case.supports), contact=contact, air=air
-    )
+    loads, supports = changed(case.loads), changed(case.supports)
+    return case.altered(loads=loads, supports=supports, contact=contact, air=air)
 
 
 def _parts(case: Case) -> Iterator[tuple[str, Any]]:

@@ -179,9 +179,8 @@ def basins(
     about |= {"same": same, "wall_seconds": time.perf_counter() - began, **used}
     about["period"] = period if frequency else None
     label = label.reshape([len(values) for values in places])
-    return _dataset(
-        case, dict(zip(names, places, strict=True)), label, periods, ends[first_of], about
-    )
+    along = dict(zip(names, places, strict=True))
+    return _dataset(case, along, label, periods, ends[first_of], about)
 
 
 def _dataset(
@@ -290,9 +289,7 @@ def _size(
     If there is no drive, or all motions end in one attractor, the starts also set the scale.
     """
     shape = case.structure.nodes.shape
-    first = [
-        [start.of_nodes(name, shape) for name in ("displacement", "velocity")] for start in starts
-    ]
+    first = [[one.of_nodes(name, shape) for name in ("displacement", "velocity")] for one in starts]
     every = np.concatenate([ends, np.array(first)[:, None]], axis=1) * weights[:, None, None]
     every = every[np.isfinite(ends).all(axis=(1, 2, 3, 4))]
     if not len(every):
@@ -376,11 +373,9 @@ class KeptEnds:
         """Ends of motions from some starts, stored or computed."""
         if self._folder is None:
             return compute()
-        numbers = [
-            part
-            for one in starts
-            for part in (one.displacement, one.velocity, one.origin and one.origin.displacement)
-        ]
+        numbers = []
+        for one in starts:
+            numbers += [one.displacement, one.velocity, one.origin and one.origin.displacement]
         about = json.loads(json.dumps({**self._about, "starts": _digest(numbers)}, default=str))
         name = name_of(about)
         file = self._folder / f"{name}.npz"

@@ -229,8 +229,7 @@ class Whole:
             away = points[own] - self.pattern.vertices[group.faces[:, :1]]
             local = np.einsum("pei,pdi->ped", away, group.frames[:, :2])
             shapes = group.panel.lift(local)[:, :, kept]
-            entries = (np.ones(own.size), (own.ravel(), np.arange(own.size)))
-            put = sparse.csr_array(entries, shape=(len(points), own.size))
+            put = sparse.eye_array(len(points), format="csr")[:, own.ravel()]
             total = total + put @ (block_diagonal(shapes).tocsr() @ placed)
         return sparse.csr_array(total)
 
@@ -244,8 +243,7 @@ class Whole:
         for group, (kept, placed) in zip(self.groups, self.amplitudes, strict=True):
             local = np.einsum("pad,ac->pdc", group.frames, group.panel.center[:, kept])
             rows = (3 * group.number[:, None] + axis).ravel()
-            entries = (np.ones(len(rows)), (rows, np.arange(len(rows))))
-            put = sparse.csr_array(entries, shape=(3 * own.panels, len(rows)))
+            put = sparse.eye_array(3 * own.panels, format="csr")[:, rows]
             centers = centers + put @ (block_diagonal(local).tocsr() @ placed)
         points.append(np.array([x[list(face)].mean(axis=0) for face in self.pattern.faces]))
         return np.concatenate(points), sparse.csr_array(sparse.vstack([*on_edges, centers]))
@@ -277,9 +275,8 @@ class Whole:
         side = 2 * np.repeat(np.arange(edges), 2 * count) + np.tile([0, 1], edges * count)
         column = own.turn(side[:, None], np.arange(self.level.turns))
         begin = self.level.turns * np.arange(len(value) + 1)
-        return sparse.csr_array(
-            (value.ravel(), column.ravel(), begin), shape=(len(value), own.size)
-        )
+        shape = (len(value), own.size)
+        return sparse.csr_array((value.ravel(), column.ravel(), begin), shape=shape)
 
     def spread(self, load: Distributed) -> NDArray[np.float64]:
         """Forces (m,), N, on the unknowns due to a distributed load."""
@@ -292,10 +289,8 @@ class Whole:
             z, share = leggauss(POINTS)
             places = 0.5 * (1.0 + z)
             for edge in np.flatnonzero(force.any(axis=1)).tolist():
-                length = float(np.linalg.norm(self._along[edge]))
-                mean = (
-                    0.5 * share @ bows(places, self._graded.radius / length, 1)[:, : own.functions]
-                )
+                cut_off = self._graded.radius / float(np.linalg.norm(self._along[edge]))
+                mean = 0.5 * share @ bows(places, cut_off, 1)[:, : own.functions]
                 first = own.bow(edge, 0)
                 out[first : first + 3 * own.functions] += np.outer(mean, force[edge]).ravel()
         if load.strain is not None and load.curvature is not None:
@@ -401,9 +396,8 @@ class Whole:
         for group in self.groups:
             edge, backwards = self._edges_of(group.faces)
             up[edge, backwards.astype(int)] = group.frames[:, None, 2]
-        return edge_frame(
-            self._along, np.where(up[:, 0].any(axis=1, keepdims=True), up[:, 0], up[:, 1])
-        )
+        one, other = up.swapaxes(0, 1)
+        return edge_frame(self._along, np.where(one.any(axis=1, keepdims=True), one, other))
 
     def dofs(
         self, held: Mapping[int, NDArray], clamped: NDArray, rigid: Collection[int]

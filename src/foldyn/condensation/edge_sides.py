@@ -65,10 +65,8 @@ def edge_sides(pattern: Pattern) -> EdgeSides:
                 taken[pair] += 1
             of[panel, row] = side
     crease_edge = [number[a, b] for a, b in pattern.creases.tolist()]
-    creases = [
-        [of[panel, row] for panel in both]
-        for row, both in zip(crease_edge, pattern.crease_faces.tolist(), strict=True)
-    ]
+    beside = zip(crease_edge, pattern.crease_faces.tolist(), strict=True)
+    creases = [[of[panel, row] for panel in both] for row, both in beside]
     return EdgeSides(
         np.array(edge), np.array(rank), np.array(way), of,
         np.array(creases, np.int64).reshape(-1, 2), np.array(crease_edge, np.int64),

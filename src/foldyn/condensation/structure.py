@@ -144,10 +144,8 @@ class Superelements(Discretized):
         arcs = min(m.arcs for m in self.meshes.graded[-2:])
         level, meshes = LEVELS[self.options.level - 1], self.meshes
         if self.finer is not None:
-            across, turns = (
-                max(own, min(other, 2 * arcs - 1))
-                for own, other in zip(level[1:3], self.finer[1:3], strict=True)
-            )
+            across = max(level.across, min(self.finer.across, 2 * arcs - 1))
+            turns = max(level.turns, min(self.finer.turns, 2 * arcs - 1))
             level = self.finer._replace(across=across, turns=turns)
             meshes = meshes._replace(level=level)
         if level.across >= 2 * arcs:
@@ -157,10 +155,8 @@ class Superelements(Discretized):
                 "divisions",
             )
         (kinds, kind), share = self.sheet.kinds(len(self.pattern.faces)), self.board_share
-        density = np.round(share, ALIKE) * np.array([kinds[k].density for k in kind])
-        sheets = [
-            replace(kinds[k], density=own) for k, own in zip(kind, density.tolist(), strict=True)
-        ]
+        density = (np.round(share, ALIKE) * np.array([kinds[k].density for k in kind])).tolist()
+        sheets = [replace(kinds[k], density=own) for k, own in zip(kind, density, strict=True)]
         made = groups(self.pattern, sheets, material_axes(self.pattern, self.sheet), meshes)
         return Whole(self.pattern, made, level, meshes.graded[-1])
 
@@ -313,19 +309,6 @@ class Superelements(Discretized):
         return self.fold_stiffness * law.slope(self.pattern.dihedrals, self.fold_rest)
 
 
-def _checked_law(given: Any) -> Any:
-    """Laws of creases, each with a slope at rest; see `laws_given`."""
-    given, laws = laws_given(given)
-    for law in laws:
-        if isinstance(law.elastic, Superlinear):
-            raise InputError(
-                f" = {law.name!r}: has no slope at rest, which superelements need; take "
-                '"linear" or "enhanced"',
-                "fold_law",
-            )
-    return given
-
-
 def superelements(
     pattern: Pattern | Patterned,
     sheet: Sheet,
@@ -386,15 +369,20 @@ def superelements(
     level = whole("level", level, least=1, most=len(LEVELS))
     if divisions is not None:
         divisions = whole("divisions", divisions, least=4)
-    fold_law = _checked_law(fold_law)
+    fold_law, laws = laws_given(fold_law)
+    for law in laws:
+        if isinstance(law.elastic, Superlinear):
+            raise InputError(
+                f" = {law.name!r}: has no slope at rest, which superelements need; take "
+                '"linear" or "enhanced"',
+                "fold_law",
+            )
     calibration.check_sheet(sheet, pattern)
     if sheet.density is None:
         raise InputError("sheet: density is missing: give it (kg/m3), the panels' mass needs it")
-    radius = (
-        float(np.max(sheet.values("thickness", len(pattern.faces))))
-        if vertex_radius is None
-        else length("vertex_radius", vertex_radius)
-    )
+    radius = float(np.max(sheet.values("thickness", len(pattern.faces))))
+    if vertex_radius is not None:
+        radius = length("vertex_radius", vertex_radius)
     plates = checked_panels(rigid, len(pattern.faces))
     check_welds(plates, pattern)
     options = SuperelementsOptions(

@@ -176,12 +176,8 @@ class SuperelementsTerm(SheetTerm):
     def compiled(self, part: Any, kept: Any, group: int) -> CompiledTerm:
         """See `Term`."""
         turns, moment = self.crease_turns, self._slope * self._changed
-        own = _Context(
-            matrix(self._panels),
-            matrix(self._folds),
-            turns.mean.T @ moment,
-            0.5 * float(moment @ self._changed),
-        )
+        energy = 0.5 * float(moment @ self._changed)
+        own = _Context(matrix(self._panels), matrix(self._folds), turns.mean.T @ moment, energy)
         return CompiledTerm(Context(own), {FORCES: _forces, ENERGIES: _energies})
 
     @cached_property
@@ -241,9 +237,8 @@ class SuperelementsTerm(SheetTerm):
         turned = np.concatenate([turned, self.rotated / self._extent])
         resisted, kinds = np.linalg.eigh(turned.T @ (self._stiffness @ turned))
         size = (np.abs(turned).T @ (abs(self._stiffness) @ np.abs(turned))).max()
-        moved = np.linalg.pinv(
-            np.hstack([np.tile(np.eye(3), (len(arm), 1)), turned[: self._nodes.size]])
-        )[3:]
+        shifts = np.tile(np.eye(3), (len(arm), 1))
+        moved = np.linalg.pinv(np.hstack([shifts, turned[: self._nodes.size]]))[3:]
         rows = kinds[:, resisted > RESISTED * size].T @ moved
         rows = rows / np.linalg.norm(rows, axis=1, keepdims=True)
         return sparse.csr_array(np.pad(rows, ((0, 0), (0, self.size - rows.shape[1]))))

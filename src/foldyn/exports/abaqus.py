@@ -175,12 +175,10 @@ def _creases(shell: CreasedShell) -> Iterator[str]:
 
 def _turn(turn: int, first: int, second: int, axis: NDArray) -> Iterator[str]:
     """Rotation of the second node relative to the first about an axis, four terms per line."""
-    terms = [
-        term
-        for dof, part in enumerate(axis.tolist(), 4)
-        if part != 0.0
-        for term in ((second, dof, -part), (first, dof, part))
-    ]
+    terms = []
+    for dof, part in enumerate(axis.tolist(), 4):
+        if part != 0.0:
+            terms += [(second, dof, -part), (first, dof, part)]
     yield "*EQUATION"
     yield f"{len(terms) + 1}"
     rows = [(turn, 1, 1.0), *terms]

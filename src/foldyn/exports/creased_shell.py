@@ -313,11 +313,8 @@ def _check(case: Case) -> None:
         raise InputError(
             ": a deck has no clamps that move or slide; hold both ends along all axes", "clamped"
         )
-    left = [
-        name
-        for name, has in (("dashpots", case.dashpots), ("motions of the base", case.base_terms))
-        if has
-    ]
+    silent = {"dashpots": case.dashpots, "motions of the base": case.base_terms}
+    left = [name for name, parts in silent.items() if parts]
     if left:
         warn(
             f"{' and '.join(left)} are left out: they change neither frequencies nor statics",

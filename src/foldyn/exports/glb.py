@@ -78,10 +78,8 @@ class Content:
         buffers = [{"byteLength": len(self.binary)}]
         text = json.dumps({**self.document, "buffers": buffers}, separators=(",", ":")).encode()
         text += b" " * (-len(text) % 4)
-        chunks = b"".join(
-            struct.pack("<I4s", len(chunk), kind) + chunk
-            for kind, chunk in ((b"JSON", text), (b"BIN\0", bytes(self.binary)))
-        )
+        parts = (b"JSON", text), (b"BIN\0", bytes(self.binary))
+        chunks = b"".join(struct.pack("<I4s", len(part), kind) + part for kind, part in parts)
         return struct.pack("<4sII", b"glTF", 2, 12 + len(chunks)) + chunks
 
 
@@ -183,13 +181,10 @@ def _content(case: Case, shapes: Shapes, animations: list[Animation]) -> Content
     """The scene: one mesh of panels and lines."""
     content, name = Content(), case.structure.pattern.name or "sheet"
     primitives, materials = _primitives(content, case)
-    shared = {
-        "attributes": {"POSITION": content.add(shapes.nodes, "nodes")},
-        "targets": [
-            {"POSITION": content.add(moved, title)}
-            for moved, title in zip(shapes.displacement, shapes.titles, strict=True)
-        ],
-    }
+    nodes = {"POSITION": content.add(shapes.nodes, "nodes")}
+    moved = zip(shapes.displacement, shapes.titles, strict=True)
+    targets = [{"POSITION": content.add(each, title)} for each, title in moved]
+    shared = {"attributes": nodes, "targets": targets}
     content.document |= {
         "asset": {"version": "2.0", "generator": f"Foldyn {__version__}"},
         "extensionsUsed": ["KHR_materials_unlit"],
@@ -214,12 +209,10 @@ def _primitives(content: Content, case: Case) -> tuple[list[dict[str, Any]], lis
     """Panels, and the lines of each kind, with their materials."""
     structure = case.structure
     paper = {"baseColorFactor": linear(PAPER), "metallicFactor": 0.0, "roughnessFactor": 0.9}
-    primitives = [
-        {"mode": TRIANGLES, "material": 0, "indices": content.indices(structure.triangles)}
-    ]
-    materials: list[dict[str, Any]] = [
-        {"name": "panels", "doubleSided": True, "pbrMetallicRoughness": paper}
-    ]
+    panels = {"name": "panels", "doubleSided": True, "pbrMetallicRoughness": paper}
+    materials: list[dict[str, Any]] = [panels]
+    faces = content.indices(structure.triangles)
+    primitives = [{"mode": TRIANGLES, "material": 0, "indices": faces}]
     pairs, kind, *_ = edge_pieces(structure.pattern, structure.nodes, structure.edge_nodes)
     for row, letter in enumerate(KINDS):
         if not (kind == row).any():
@@ -227,13 +220,8 @@ def _primitives(content: Content, case: Case) -> tuple[list[dict[str, Any]], lis
         color = {"baseColorFactor": linear(CREASES.get(letter, BLACK)), "metallicFactor": 0.0}
         lines = content.indices(pairs[kind == row])
         primitives.append({"mode": LINES, "material": len(materials), "indices": lines})
-        materials.append(
-            {
-                "name": CREASE_NAMES.get(letter, "boundary"),
-                "pbrMetallicRoughness": color,
-                "extensions": {"KHR_materials_unlit": {}},
-            }
-        )
+        line = {"name": CREASE_NAMES.get(letter, "boundary"), "pbrMetallicRoughness": color}
+        materials.append(line | {"extensions": {"KHR_materials_unlit": {}}})
     return primitives, materials
 
 

@@ -77,6 +77,10 @@ def write(
     content = {name: _values(taken[name]) for name in names}
     for name, values in content.items():
         _check_size(name, values)
+    attributes = {
+        key: str(value) if isinstance(value, str) else np.asarray(value, float)
+        for key, value in result.attrs.items()
+    }
     content |= {
         "vertices": pattern.vertices,
         "faces": _faces(pattern.faces),
@@ -85,12 +89,7 @@ def write(
         "case_file": sections_of(result),
         "units": _texts(result, names, "units"),
         "labels": _texts(result, names, "long_name"),
-        "attributes": _named(
-            {
-                key: str(value) if isinstance(value, str) else np.asarray(value, float)
-                for key, value in result.attrs.items()
-            }
-        ),
+        "attributes": _named(attributes),
     }
     with whole(path) as part:
         savemat(part, _named(content), appendmat=False, long_field_names=True, oned_as="column")

@@ -31,10 +31,9 @@ def section(result: xarray.Dataset) -> Iterator[str]:
         raise InputError(": has several states; choose one, as result.isel(state=0)", "result")
     density = line(result["density"].item()) if "density" in result else ""
     if "membrane" in result:
+        membrane, bending = result["membrane"].values, result["bending"].values
         coupling = result["coupling"].values
-        matrix = np.block(
-            [[result["membrane"].values, coupling], [coupling.T, result["bending"].values]]
-        )
+        matrix = np.block([[membrane, coupling], [coupling.T, bending]])
         yield "** A repeated sheet as a plate, made by Foldyn, in SI units. Elements lie in the"
         yield "** plane of its center of mass. Shells that shear need *TRANSVERSE SHEAR STIFFNESS."
         yield "*ORIENTATION, NAME=SHEET_AXES"
@@ -81,6 +80,4 @@ def _beam(result: xarray.Dataset, density: str) -> Iterator[str]:
 
 def line(*values: Any) -> str:
     """A line of data, in numbers of at most 20 columns."""
-    return ", ".join(
-        f"{value:.12g}" if isinstance(value, float) else str(value) for value in values
-    )
+    return ", ".join(f"{one:.12g}" if isinstance(one, float) else str(one) for one in values)

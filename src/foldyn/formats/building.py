@@ -182,11 +182,8 @@ def _pattern(panels: Panels, drawing: Drawing, notes: Notes) -> Pattern:
             f"{count(folds, 'mountain or valley', 'mountains or valleys')} on the outline, of one "
             "panel only, taken as the boundary"
         )
-    angles = {
-        edge: float(np.radians(panels.angles[edge]))
-        for edge in creases
-        if np.isfinite(panels.angles.get(edge, np.nan))
-    }
+    drawn = {edge: panels.angles.get(edge, np.nan) for edge in creases}
+    angles = {edge: float(np.radians(own)) for edge, own in drawn.items() if np.isfinite(own)}
     with warnings.catch_warnings(record=True, action="always", category=FoldynWarning) as doubts:
         pattern = Pattern(
             panels.points, faces, letters, drawing.name, fold_angles=angles, custom=drawing.custom

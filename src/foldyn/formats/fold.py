@@ -303,9 +303,7 @@ def _families(given: Any, count: int) -> dict[str, list[tuple[int, int]]]:
     """Vertex pairs of the creases of each family."""
     if not isinstance(given, dict) or not all(isinstance(pairs, list) for pairs in given.values()):
         raise InputError(f"{FAMILIES}: give a list of vertex pairs for each name.")
-    return {
-        name: _pairs(f"{FAMILIES}[{show(name)}]", pairs, count) for name, pairs in given.items()
-    }
+    return {name: _pairs(f"{FAMILIES}[{show(name)}]", rows, count) for name, rows in given.items()}
 
 
 def write(pattern: Pattern, frames: Sequence[Frame] = ()) -> str:

@@ -54,12 +54,9 @@ def listed_panels(
     lines, contradictions = single(without_points(lines))
     notes.contradict(contradictions)
     pairs = [edge_of(a, b) for a, b in lines.ends.tolist()]
-    panels = Panels(
-        lines.points,
-        faces,
-        dict(zip(pairs, lines.letters.tolist(), strict=True)),
-        dict(zip(pairs, lines.angles.tolist(), strict=True)),
-    )
+    letters = dict(zip(pairs, lines.letters.tolist(), strict=True))
+    angles = dict(zip(pairs, lines.angles.tolist(), strict=True))
+    panels = Panels(lines.points, faces, letters, angles)
     panels, twice = _once(panels)
     if twice:
         notes.repairs.append(

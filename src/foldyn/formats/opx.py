@@ -7,16 +7,13 @@ files. Source of the format: fold's src/oripa.coffee (https://github.com/edemain
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from xml.etree.ElementTree import Element
 
 from foldyn.errors import InputError
 from foldyn.formats.cp import LETTERS
 from foldyn.formats.drawing import Drawing, coordinate
 from foldyn.formats.xml_text import from_xml, local
 from foldyn.values import show
-
-if TYPE_CHECKING:
-    from xml.etree.ElementTree import Element
 
 _COORDINATES = ("x0", "y0", "x1", "y1")
 
@@ -40,12 +37,8 @@ def read(text: str) -> Drawing:
         The text is not OPX, or a line is invalid; the message names it.
     """
     root = from_xml(text, "an OPX file")
-    objects = [
-        element
-        for element in root.iter()
-        if local(element) == "object"
-        and element.get("class", "").rpartition(".")[2] == "OriLineProxy"
-    ]
+    objects = [element for element in root.iter() if local(element) == "object"]
+    objects = [one for one in objects if one.get("class", "").rpartition(".")[2] == "OriLineProxy"]
     if not objects:
         raise InputError(": there are none (of the class OriLineProxy)", "lines")
     letters: list[str] = []

@@ -160,17 +160,13 @@ def _parted(
 
 def _halved(panels: Panels, edges: list[Edge]) -> Panels:
     """Panels with a midpoint added to some edges."""
-    middle = {edge: len(panels.points) + k for k, edge in enumerate(edges)}
+    middle = {edge: [len(panels.points) + k] for k, edge in enumerate(edges)}
     places = [0.5 * (panels.points[a] + panels.points[b]) for a, b in edges]
     faces: Faces = tuple(
-        tuple(
-            point
-            for a, b in around(face)
-            for point in ((a, middle[edge_of(a, b)]) if edge_of(a, b) in middle else (a,))
-        )
+        tuple(v for a, b in around(face) for v in (a, *middle.get(edge_of(a, b), ())))
         for face in panels.faces
     )
     letters = dict(panels.letters)
-    for (a, b), point in middle.items():
+    for (a, b), (point,) in middle.items():
         letters[edge_of(a, point)] = letters[edge_of(b, point)] = "C"
     return Panels(np.concatenate((panels.points, places)), faces, letters, panels.angles)

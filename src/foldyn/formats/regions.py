@@ -65,10 +65,8 @@ def _faces(lines: Lines) -> tuple[Faces, int]:
     if hollow.any():
         triangles = shapely.get_parts(shapely.constrained_delaunay_triangles(polygons[hollow]))
         polygons = np.concatenate((polygons[~hollow], triangles))
-    polygons = shapely.orient_polygons(polygons)
-    corners, polygon = shapely.get_coordinates(
-        shapely.get_exterior_ring(polygons), return_index=True
-    )
+    rings = shapely.get_exterior_ring(shapely.orient_polygons(polygons))
+    corners, polygon = shapely.get_coordinates(rings, return_index=True)
     used = np.unique(lines.ends)  # unused points may coincide with others
     places = lines.points[used].tolist()
     number = {(x, y): k for k, (x, y) in zip(used.tolist(), places, strict=True)}
@@ -120,11 +118,8 @@ def areas(panels: Panels) -> NDArray[np.float64]:
 
 def parts(panels: Panels) -> NDArray[np.int64]:
     """Part number of each panel; edges that are not cuts join panels to a part."""
-    pairs = [
-        (at[0], at[1])
-        for edge, at in panels.sides().items()
-        if len(at) == 2 and panels.letters.get(edge) != "C"
-    ]
+    letters, sides = panels.letters, panels.sides()
+    pairs = [at for edge, at in sides.items() if len(at) == 2 and letters.get(edge) != "C"]
     return components(pairs, len(panels.faces))
 
 

@@ -43,7 +43,6 @@ def triangles(pattern: Pattern) -> NDArray[np.int64]:
     """Vertex numbers (k, 3) of triangles that cover the panels, with the same winding."""
     found: list[tuple[int, ...]] = []
     for face, normal in zip(pattern.faces, pattern.face_normals, strict=True):
-        found += (
-            [face] if len(face) == 3 else triangles_of(face, pattern.vertices[list(face)], normal)
-        )
+        corners = pattern.vertices[list(face)]
+        found += [face] if len(face) == 3 else triangles_of(face, corners, normal)
     return np.array(found, dtype=np.int64)

@@ -15,7 +15,7 @@ from collections import Counter
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 from html import escape
-from typing import TYPE_CHECKING
+from xml.etree.ElementTree import Element
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,10 +31,8 @@ from foldyn.formats.svg_styles import Rules, Style, declared, rules_of, styled
 from foldyn.formats.writers import flat_points, letters
 from foldyn.formats.xml_text import DEEPEST, from_xml, local
 from foldyn.patterns import Pattern
+from foldyn.patterns.palette import CREASE_NAMES
 from foldyn.values import LONGEST
-
-if TYPE_CHECKING:
-    from xml.etree.ElementTree import Element
 
 _GROUPS = ("svg", "g", "a", "switch")
 _NOT_DRAWN = ("text", "image", "foreignObject")
@@ -103,11 +101,10 @@ def read(text: str) -> Drawing:
 
 def _frame(root: Element) -> _Frame:
     box = numbers(root.get("viewBox", ""))
-    sizes = [(root.get(key) or "").strip() for key in ("width", "height")]
-    physical = any(size[-2:].lower() in _STATED for size in sizes)
+    sizes = {key: (root.get(key) or "").strip() for key in ("width", "height")}
+    physical = any(size[-2:].lower() in _STATED for size in sizes.values())
     pixels = [
-        0.0 if "%" in size else length(size, 0.0, f"svg.{key}")
-        for key, size in zip(("width", "height"), sizes, strict=True)
+        0.0 if "%" in size else length(size, 0.0, f"svg.{key}") for key, size in sizes.items()
     ]
     if len(box) != 4 or not (box[2] > 0 and box[3] > 0):
         return _Frame((pixels[0] or 100.0, pixels[1] or 100.0), 1.0, physical)
@@ -245,14 +242,7 @@ def _skipped(counts: Counter[str]) -> list[str]:
 
 PER_METER = 1e3  # mm
 PAINT = {letter: "#{:02x}{:02x}{:02x}".format(*rgb) for rgb, (letter, _) in COLORS.items()}
-NAMES = {
-    "B": "boundary",
-    "M": "mountain",
-    "V": "valley",
-    "F": "facet",
-    "U": "unassigned",
-    "C": "cut",
-}
+NAMES = {**CREASE_NAMES, "F": "facet", "B": "boundary", "C": "cut"}
 FAINTEST = 1e-6
 """Opacity of a crease with fold angle 0: a line of opacity 0 would be invisible."""
 _DARKER = {"F": "#b8a000", "C": "#00a000"}  # colors of words, which must be readable on white

@@ -7,7 +7,8 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
+from xml.etree.ElementTree import Element
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,9 +17,6 @@ from foldyn.errors import InputError
 from foldyn.formats.chords import arc_chords, bezier
 from foldyn.formats.xml_text import local
 from foldyn.values import show
-
-if TYPE_CHECKING:
-    from xml.etree.ElementTree import Element
 
 PIXEL = 0.0254 / 96
 """Length of a CSS pixel (m)."""

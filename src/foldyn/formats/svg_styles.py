@@ -6,7 +6,7 @@ import math
 import re
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from xml.etree.ElementTree import Element
 
 from foldyn.errors import InputError
 from foldyn.formats.drawing import read_number
@@ -14,9 +14,6 @@ from foldyn.formats.line_colors import RGB
 from foldyn.formats.svg_shapes import SHAPES
 from foldyn.formats.xml_text import local
 from foldyn.values import choice, show
-
-if TYPE_CHECKING:
-    from xml.etree.ElementTree import Element
 
 PROPERTIES = (
     "stroke", "stroke-opacity", "opacity", "display", "visibility", "color", "transform",

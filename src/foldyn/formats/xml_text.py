@@ -3,13 +3,10 @@
 from __future__ import annotations
 
 import re
-from typing import TYPE_CHECKING
+from xml.etree.ElementTree import Element, ParseError
 
 from foldyn.errors import InputError
 from foldyn.values import shortened
-
-if TYPE_CHECKING:
-    from xml.etree.ElementTree import Element
 
 DEEPEST = 100
 """Largest number of levels of nested elements."""
@@ -36,8 +33,6 @@ def from_xml(text: str, what: str) -> Element:
     InputError
         The text is not XML, has entities or external parts, or is nested too deep.
     """
-    from xml.etree.ElementTree import ParseError
-
     from defusedxml import DefusedXmlException, ElementTree
 
     try:

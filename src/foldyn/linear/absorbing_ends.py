@@ -205,9 +205,8 @@ def absorbing_end(case: Case, nodes: Nodes, *, waves: LongWaves) -> list[Dashpot
     chosen = resolve_nodes(structure, nodes, "nodes")
     impedance = waves.impedance
     axis = np.array(waves.axis) / np.linalg.norm(waves.axis)
-    motions = _rigid(
-        structure.nodes[chosen], axis, np.array(waves.point), turns=len(impedance) == 2
-    )
+    points, center = structure.nodes[chosen], np.array(waves.point)
+    motions = _rigid(points, axis, center, turns=len(impedance) == 2)
     arms = np.linalg.norm(motions[:, :, -1], axis=1)
     if arms.min() <= ON_AXIS * arms.max():
         raise InputError(
@@ -219,11 +218,9 @@ def absorbing_end(case: Case, nodes: Nodes, *, waves: LongWaves) -> list[Dashpot
     for node, motion in zip(chosen.tolist(), motions, strict=True):
         inverse = np.linalg.pinv(motion)
         coefficients, ways = np.linalg.eigh(inverse.T @ (impedance / len(chosen)) @ inverse)
-        found += [
-            Dashpot(float(c), nodes=[node], direction=tuple(way.tolist()))
-            for c, way in zip(coefficients, ways.T, strict=True)
-            if c > NEGLIGIBLE * coefficients[-1]
-        ]
+        for c, way in zip(coefficients.tolist(), ways.T.tolist(), strict=True):
+            if c > NEGLIGIBLE * coefficients[-1]:
+                found.append(Dashpot(c, nodes=[node], direction=tuple(way)))
     return found
 
 

@@ -245,10 +245,8 @@ def polarizations(
     if isinstance(structure, Superelements):
         base = [min(patch.step[list(face)].tolist()) for face in structure.pattern.faces]
         own = np.flatnonzero([not any(step) for step in base])  # panels of cell 0
-        panels = [
-            (linear.reach.gathered(amplitudes), masses)
-            for amplitudes, masses in structure.along_axes(case.held_edges, own)
-        ]
+        each = structure.along_axes(case.held_edges, own)
+        panels = [(linear.reach.gathered(amplitudes), masses) for amplitudes, masses in each]
         added = np.repeat(case.point_masses[patch.own_nodes], 3)[:, None]
     out = []
     for phase, (_, shapes, momentum) in zip(phases, waves, strict=True):
@@ -379,10 +377,9 @@ def band_gaps(bands: Any, least: float = 1e-3) -> xarray.Dataset:
     least = number("least", least, least=0.0)
     found = []
     for direction, rows in legs(bands).items():
+        gaps = _gaps(frequency[rows], least)
         # a gap below the first band concerns the whole zone, or does not exist
-        found += [
-            (direction, *gap) for gap in _gaps(frequency[rows], least) if gap[0] or direction == ALL
-        ]
+        found += [(direction, *gap) for gap in gaps if gap[0] or direction == ALL]
     direction, below, bottom, top = ([gap[k] for gap in found] for k in range(4))
     low, high = np.array(bottom, float), np.array(top, float)
     middle, width = 0.5 * (low + high), high - low

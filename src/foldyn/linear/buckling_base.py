@@ -107,15 +107,12 @@ class Base:
         self._exact: Solution = exact
         self.slope = self._slope(matrix)
         self.step = STEP / self.stretch()
-        ahead, behind = (
-            self.tangent(self.u + way * self.slope, self.factor + way)
-            for way in (self.step, -self.step)
-        )
+        ahead = self.tangent(self.u + self.step * self.slope, self.factor + self.step)
+        behind = self.tangent(self.u - self.step * self.slope, self.factor - self.step)
         change = self._reduce(sparse.csr_array((ahead - behind) / (2.0 * self.step)))
         if not change.is_symmetric:
-            loads = problem.case.constraints.matrix(
-                problem.load_stiffness(problem.dofs(self.u), 1.0)
-            )
+            loads = problem.load_stiffness(problem.dofs(self.u), 1.0)
+            loads = problem.case.constraints.matrix(loads)
             warn_of_asymmetry(asymmetry(Reduction(problem.free)(sparse.csr_array(loads)).exact))
         self.softening = Softening(
             block.symmetric, change.symmetric, factors, self._factorize,
@@ -298,15 +295,13 @@ class _Shapes:
         states = problem.case.constraints.extended(along.shape[1])
         axis, tri = np.arange(3), shell.triangles
         nodes, first = np.unique(ends, return_index=True)
-        put = _entries(
-            1.0, 3 * nodes[:, None] + axis, 3 * first[:, None] + axis, (x.size, along.shape[0])
-        )
+        rows, columns = 3 * nodes[:, None] + axis, 3 * first[:, None] + axis
+        put = _entries(1.0, rows, columns, (x.size, along.shape[0]))
         # sides of triangles on edges
         a, b, c = (np.roll(tri, -k, axis=1).ravel() for k in range(3))
         low, high = ends[:, :-1].ravel(), ends[:, 1:].ravel()
-        own, wanted = (
-            np.minimum(i, j) * len(x) + np.maximum(i, j) for i, j in ((low, high), (a, b))
-        )
+        own = np.minimum(low, high) * len(x) + np.maximum(low, high)
+        wanted = np.minimum(a, b) * len(x) + np.maximum(a, b)
         order = np.argsort(own)
         piece = order[np.searchsorted(own[order], wanted).clip(max=len(own) - 1)]
         rotation = sides.rotation.ravel()

@@ -94,7 +94,7 @@ def relaxed(
         place, now = rest + displacement, deformed_motions(cell, patch, displacement)
     end = now if motions is None else _given(cell, motions)
     first = np.array([images(now, place[v], -patch.own_step[v]) for v in patch.first.tolist()])
-    first, begin = first.reshape(-1, 3), np.array([motion.twist for motion in now])
+    begin = np.array([motion.twist for motion in now])
     way = np.array([motion.twist for motion in end]) - begin
     for k in range(1, steps + 1):
         share = k / steps
@@ -108,12 +108,11 @@ def relaxed(
 
 def _given(cell: UnitCell, motions: Any) -> tuple[Screw, ...]:
     """The final motions."""
-    given = [
-        motion
-        if isinstance(motion, Screw)
-        else translation(vector(f"motions[{k}]", motion, nonzero=True))
-        for k, motion in enumerate(listed("motions", motions, "screws or vectors (m)"))
-    ]
+    given = []
+    for k, motion in enumerate(listed("motions", motions, "screws or vectors (m)")):
+        if not isinstance(motion, Screw):
+            motion = translation(vector(f"motions[{k}]", motion, nonzero=True))
+        given.append(motion)
     if len(given) != cell.dimensions:
         raise InputError(f": {len(given)} of them; the cell has {cell.dimensions}", "motions")
     check_commuting(cell.case.structure.nodes, given, cell.near, "motions")

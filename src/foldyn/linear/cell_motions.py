@@ -132,10 +132,8 @@ def space_time(
     choice("component", component, COMPONENTS)
     time, positions = _motion(trajectory)
     cells = cells_of(positions, cell, along)
-    moved, speed = (
-        trajectory[name].transpose("time", "node", "axis").values
-        for name in ("displacement", "velocity")
-    )
+    moved = trajectory["displacement"].transpose("time", "node", "axis").values
+    speed = trajectory["velocity"].transpose("time", "node", "axis").values
     motion, rest = cells.motion, positions[cells.nodes]
     axial = (moved[:, cells.nodes] @ motion.unit).mean(axis=2)
     if component == "rotation":

@@ -194,10 +194,9 @@ def _structure(
         if options.get(name):
             options[name] = _edges(name, options[name], lattice, pattern, vertices)
     if options.get("guided"):
-        by_axis = {
-            axis: [(low, high) for low, high, own_axis in options["guided"] if own_axis == axis]
-            for axis in {axis for *_, axis in options["guided"]}
-        }
+        by_axis: dict[Any, list[tuple[int, int]]] = {}
+        for low, high, axis in options["guided"]:
+            by_axis.setdefault(axis, []).append((low, high))
         options["guided"] = {
             axis: _edges("guided", edges, lattice, pattern, vertices)
             for axis, edges in sorted(by_axis.items())
@@ -224,12 +223,8 @@ def _copied(chosen: Iterable[int], panels: Sequence[Panel]) -> list[int]:
 
 def _sheet(sheet: Sheet, panels: Sequence[Panel]) -> Sheet:
     """The sheet, with panels that differ from it repeated in all cells."""
-    parts = [
-        replace(part, panels=rows)
-        for part in sheet.panels
-        if (rows := _copied(np.ravel(part.panels).tolist(), panels))
-    ]
-    return replace(sheet, panels=parts)
+    copied = [(part, _copied(np.ravel(part.panels).tolist(), panels)) for part in sheet.panels]
+    return replace(sheet, panels=[replace(part, panels=rows) for part, rows in copied if rows])
 
 
 def _per_crease(
@@ -277,10 +272,8 @@ def _edges(
     inside = [pair for kind, pair in kinds.items() if len(lattice.beside[kind]) > 1]
     if inside:
         raise InputError(f": edge {inside[0]} is a crease between cells; leave it out", name)
-    rim = kinds_of(pattern.boundary, vertices)
-    return [
-        (a, b) for (a, b), kind in zip(pattern.boundary.tolist(), rim, strict=True) if kind in kinds
-    ]
+    rim = zip(pattern.boundary.tolist(), kinds_of(pattern.boundary, vertices), strict=True)
+    return [(a, b) for (a, b), kind in rim if kind in kinds]
 
 
 # ---------------------------------------------------------------------- nodes and hidden dofs
@@ -288,9 +281,7 @@ def node_sites(
     structure: Discretized, vertices: Sequence[Vertex], panels: Sequence[Panel]
 ) -> list[Site]:
     """Sites of the nodes of a structure: vertices, points of edges, and points inside panels."""
-    sites: dict[int, Site] = {
-        v: (step, ("vertex", kind)) for v, (step, kind) in enumerate(vertices)
-    }
+    sites: dict[int, Site] = {v: (at, ("vertex", kind)) for v, (at, kind) in enumerate(vertices)}
     for first, *inner, last in structure.edge_nodes.tolist() if len(structure.edge_nodes) else ():
         if inner:
             edge = edge_between(vertices[first], vertices[last])
@@ -400,20 +391,15 @@ class Repeated:
     def patch_case(self) -> Case:
         """The case of the patch."""
         case = self.case
-        supports = [
-            copy
-            for i, part in enumerate(case.supports)
-            for copy in self._supports(part, f"supports[{i}]")
-        ]
+        supports = []
+        for i, part in enumerate(case.supports):
+            supports += self._supports(part, f"supports[{i}]")
         masses = [
             replace(part, nodes=self._nodes(part.nodes, f"masses[{i}].nodes"))
             for i, part in enumerate(case.masses)
         ]
-        loads = [
-            self._on_creases(load, f"loads[{i}]")
-            for i, load in enumerate(case.loads)
-            if isinstance(load, Actuate)
-        ]
+        folding = [(i, load) for i, load in enumerate(case.loads) if isinstance(load, Actuate)]
+        loads = [self._on_creases(load, f"loads[{i}]") for i, load in folding]
         damping = [
             self._on_creases(part, "damping") if isinstance(part, CreaseDamping) else part
             for part in case.dampings
@@ -471,9 +457,8 @@ class Repeated:
         if getattr(part, "between", None) is not None:
             return self._between(part)
         nodes = self._resolved(part.nodes, f"{field}.nodes")
-        if not self._turns or (
-            isinstance(part, Fix) and part.axes is not None and len(part.axes) == 3
-        ):
+        along_all = isinstance(part, Fix) and len(part.axes or "") == 3
+        if along_all or not self._turns:
             return [replace(part, nodes=self._nodes(nodes, field))]
         if getattr(part, "axes", None) is not None:
             part = [replace(part, axes=None, direction=axis) for axis in part.axes or ""]

@@ -92,12 +92,10 @@ def character(
     kind = np.where(share.max(axis=1) > 0.5, ranked[:, 0], "mixed").astype("<U20")
     kind[modes["rigid"].values] = "rigid"
     order = np.array([int((kind[: k + 1] == kind[k]).sum()) for k in range(len(kind))])
-    names = np.array(
-        [
-            f"mixed: {first}, {second}" if what == "mixed" else f"{_ordinal(n)} {what}"
-            for n, what, (first, second, *_) in zip(order, kind, ranked, strict=True)
-        ]
-    )
+    names = [
+        f"mixed: {first}, {second}" if what == "mixed" else f"{_ordinal(n)} {what}"
+        for n, what, (first, second, *_) in zip(order, kind, ranked, strict=True)
+    ]
     return xarray.Dataset(
         {
             "share": (("mode", "kind"), share, {"long_name": "share of the mode's motion"}),

@@ -182,11 +182,9 @@ class Fidelity:
 
 def _text(found: Fidelity) -> str:
     """Modes and errors of all models in aligned columns, in blocks of models."""
-    parts = [
-        _columns(found, found.models[k : k + ABREAST]) for k in range(0, len(found.models), ABREAST)
-    ]
-    parts.append("\n".join(legend(found)))
-    return "\n\n".join(parts)
+    models = found.models
+    parts = [_columns(found, models[k : k + ABREAST]) for k in range(0, len(models), ABREAST)]
+    return "\n\n".join([*parts, "\n".join(legend(found))])
 
 
 def legend(found: Fidelity) -> list[str]:
@@ -210,15 +208,13 @@ def _columns(found: Fidelity, models: tuple[str, ...]) -> str:
     """Modes and errors of some models."""
     result = found.result.sel(model=list(models))
     tables = [found.table(model) for model in models]
-    rows = [
-        ["mode", result.attrs["reference"], *(text for model in models for text in (model, "MAC"))]
-    ]
+    header = [text for model in models for text in (model, "MAC")]
+    rows = [["mode", result.attrs["reference"], *header]]
     for every in zip(*tables, strict=True):
         first = every[0]
         row = [f"{first.mode}{'' if first.below else ' *'}", f"{first.shell:.4g} Hz"]
         for mode in every:
-            row += [percent(mode.error) if math.isfinite(mode.error) else "lost"]
-            row += [f"{mode.mac:.2f}"]
+            row += [percent(mode.error) if math.isfinite(mode.error) else "lost", f"{mode.mac:.2f}"]
         rows.append(row)
     if "deflection" in result:
         row = ["small loads", f"{result['deflection'].item():.4g} m"]

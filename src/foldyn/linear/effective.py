@@ -509,9 +509,8 @@ class CellEnergy:
         field = self.displacements(strains)
         pull = self._tangent @ field
         turned = pull.copy()  # with the forces in the state, which turn with the cells
-        turned[: self.points.size] += by_dof(
-            np.cross(self._force[:, None], strains.turn[self._cell])
-        )
+        change = np.cross(self._force[:, None], strains.turn[self._cell])
+        turned[: self.points.size] += by_dof(change)
         push = copies.conj().T @ turned
         inner = sparse.csc_array(copies.conj().T @ self._tangent @ copies)
         eased = _solved(inner, push, self._weight * rigid)

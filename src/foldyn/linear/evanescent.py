@@ -128,10 +128,8 @@ def attenuation(
         "phase": (("frequency", "wave"), out, {"units": "rad"}),
         "attenuation": ("frequency", np.where(least <= TRAVELS, 0.0, least), {"units": "Np"}),
     }
-    run = {
-        "frequency": ("frequency", wanted, {"units": "Hz"}),
-        "wave": ("wave", 1 + np.arange(count)),
-    }
+    number = 1 + np.arange(count)
+    run = {"frequency": ("frequency", wanted, {"units": "Hz"}), "wave": ("wave", number)}
     facts = {"count": count, "secant": secant, "along": along, "other_phase": phase}
     return result_dataset("attenuation", cell.case, data | linear.variables, run, facts)
 

@@ -154,9 +154,8 @@ def _base(case: Case, part: BaseMotion, amplitude: float) -> Drive:
     if part.value == 0.0:
         raise InputError("drive[0].value = 0: the base must move")
     column = AXES.index(part.axis)
-    if any(vectors[:, column].any() for vectors, _ in case.imposed_terms) or (
-        case.imposed[:, column].any()
-    ):
+    imposed = [case.imposed, *(vectors for vectors, _ in case.imposed_terms)]
+    if any(one[:, column].any() for one in imposed):
         raise InputError(
             f"drive[0]: an Impose holds nodes along {part.axis}, which would not follow the base; "
             "use Fix instead of Impose there and start from a state with these displacements"
@@ -188,15 +187,13 @@ def drive_terms(system: Linearized, drive: Drive) -> list[Term]:
     if drive.axis is None:
         return [Term(system.projected((drive.vector / drive.value).ravel()), lambda omega: 1.0)]
     axis, damping = AXES.index(drive.axis), system.case.rayleigh
-    inertia, *others = (
-        Term(forces[:, axis], factor)
-        for forces, factor in (
-            (system.inertia, lambda omega: omega**2 - 1j * omega * damping.alpha),
-            (system.pushed, lambda omega: omega**2),
-            (system.ground, lambda omega: -1.0 - 1j * omega * damping.beta),
-            (system.drag, lambda omega: -1j * omega),
-        )
+    parts = (
+        (system.inertia, lambda omega: omega**2 - 1j * omega * damping.alpha),
+        (system.pushed, lambda omega: omega**2),
+        (system.ground, lambda omega: -1.0 - 1j * omega * damping.beta),
+        (system.drag, lambda omega: -1j * omega),
     )
+    inertia, *others = (Term(forces[:, axis], factor) for forces, factor in parts)
     return [inertia, *(term for term in others if term.shape.any())]
 
 

@@ -50,19 +50,17 @@ from foldyn.structures.beyond_range import BELOW, plate_frequency
 from foldyn.structures.discretized import Discretized
 from foldyn.values import choice, listed, show, whole
 
+PLATE = {
+    "scheme": "n5b8", "calibration": "plate", "mass": "consistent", "bend_law": "linear",
+    "membrane": "panel", "bar_law": "linear",
+}  # fmt: skip
 MODELS: Mapping[str, Mapping[str, Any]] = {
     "standard": {
         "scheme": "n5b8", "calibration": "standard", "mass": "mixed_voronoi", "bend_law": "linear",
         "straight": (), "membrane": "bars", "bar_law": "ogden",
     },
-    "plate": {
-        "scheme": "n5b8", "calibration": "plate", "mass": "consistent", "bend_law": "linear",
-        "membrane": "panel", "bar_law": "linear",
-    },
-    "n5b8e": {
-        "scheme": "n5b8e", "calibration": "plate", "mass": "condensed", "bend_law": "linear",
-        "membrane": "panel", "bar_law": "linear",
-    },
+    "plate": PLATE,
+    "n5b8e": {**PLATE, "scheme": "n5b8e", "mass": "condensed"},
     "bars": {
         "scheme": "n5b8e", "calibration": "plate", "mass": "condensed", "bend_law": "linear",
         "membrane": "bars",
@@ -373,17 +371,12 @@ class SmallLoads(NamedTuple):
     ----------
     work : float
         Forces times displacements, J.
-    load : float
-        Sum of the absolute values of the components of all forces, N.
+    displacement : float
+        Mean displacement along the forces, weighted by the forces, m.
     """
 
     work: float
-    load: float
-
-    @property
-    def displacement(self) -> float:
-        """Mean displacement (m) along the forces, weighted by the forces."""
-        return self.work / self.load
+    displacement: float
 
 
 def forces_alone(case: Case) -> tuple[Case, list[int]]:
@@ -432,4 +425,4 @@ def small_loads(case: Case, secant: float | None = None) -> SmallLoads:
     force = rest_forces(case)
     free = linear.projected(force)
     work = float(free @ factorize(linear.stiffness).solve(free))
-    return SmallLoads(work, float(np.abs(force).sum()))
+    return SmallLoads(work, work / float(np.abs(force).sum()))

@@ -180,9 +180,8 @@ class ModalResponse:
             if correction and factors is not None:
                 pencil, shift = modes.pencil, modes.shift
                 whole = factors.solve(term.shape)
-                whole += factors.solve(
-                    term.shape - pencil.stiffness @ whole + shift * (pencil.mass @ whole)
-                )
+                miss = term.shape - pencil.stiffness @ whole + shift * (pencil.mass @ whole)
+                whole += factors.solve(miss)
                 left.append(whole - basis.shapes @ (load / (basis.values - shift * basis.inertia)))
             else:
                 left.append(np.zeros(modes.pencil.size))

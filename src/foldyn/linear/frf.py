@@ -333,9 +333,8 @@ def convert(response: xarray.Dataset, quantity: str) -> xarray.Dataset:
             "response: a transmissibility is a motion per motion: the same for displacements, "
             "velocities and accelerations"
         )
-    values = convert_response(
-        response["frequency"].values, response[held].values, source=held, target=quantity
-    )
+    frequency = response["frequency"].values
+    values = convert_response(frequency, response[held].values, source=held, target=quantity)
     other = RESPONSES[quantity]
     named = variable(tuple(map(str, response[held].dims)), values, other.units, other.text)
     return response.drop_vars(held).assign({quantity: named})

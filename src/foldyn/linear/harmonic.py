@@ -172,13 +172,9 @@ class Hinges:
                 (turned.real, turned.real), (turned.real, turned.imag), (turned.imag, turned.imag),
             )
         ]  # fmt: skip
-        return sparse.block_array(
-            [
-                [whole.real + parts[0], parts[1] - whole.imag],
-                [parts[1] + whole.imag, whole.real + parts[2]],
-            ],
-            format="csc",
-        )
+        real = [whole.real + parts[0], parts[1] - whole.imag]
+        imaginary = [parts[1] + whole.imag, whole.real + parts[2]]
+        return sparse.block_array([real, imaginary], format="csc")
 
 
 def _balanced(

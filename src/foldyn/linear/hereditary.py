@@ -103,9 +103,8 @@ def branches_of(case: Case, q: NDArray, free: NDArray, dampers: bool = False) ->
         rows = [branch.rate for branch in branches]
         rate.append(np.stack([*rows, *[np.ones(len(stiffness))] * missing], axis=1))
     relaxed, share, rate, viscous = map(np.concatenate, (relaxed, share, rate, viscous))
-    return Branches(
-        sparse.csr_array(gradient[:, free]), relaxed[of], share[of], rate[of], viscous[of]
-    )
+    gradient = sparse.csr_array(gradient[:, free])
+    return Branches(gradient, relaxed[of], share[of], rate[of], viscous[of])
 
 
 def damped_mode(

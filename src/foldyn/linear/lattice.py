@@ -8,6 +8,7 @@ directions of hinges, signs of rotations, ties.
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, NamedTuple
 
@@ -75,11 +76,9 @@ class Lattice:
         pattern: Pattern = cell.case.structure.pattern
         self.cell, self.pattern, self.zero = cell, pattern, (0,) * cell.dimensions
         self.vertices = cell.copies.named
-        self.faces: list[list[Vertex]] = []
-        self.steps: list[Step] = []
-        for step, corners in cell.copies.panels(pattern):
-            self.faces.append(corners)
-            self.steps.append(step)
+        panels = cell.copies.panels(pattern)
+        self.steps = [step for step, _ in panels]
+        self.faces = [corners for _, corners in panels]
         self.beside: dict[Kind, list[tuple[int, Step]]] = {}
         for f in range(len(self.faces)):
             for edge in self._edges(f):
@@ -128,9 +127,7 @@ class Lattice:
 
         Two panels alone would share a front: none are left alone at a junction of several.
         """
-        found = {
-            (minus(self.zero, step), f) for f, face in enumerate(self.faces) for step, _ in face
-        }
+        found = {(minus(self.zero, step), f) for f, own in enumerate(self.faces) for step, _ in own}
         for _ in range(RINGS):
             found |= {other for panel in found for other in self._across(*panel)}
         while missing := self._beside_pairs(found) - found:
@@ -139,17 +136,11 @@ class Lattice:
 
     def _beside_pairs(self, panels: set[Panel]) -> set[Panel]:
         """All panels at junctions at which there are two of the given panels."""
-        at: dict[tuple[Kind, Step], int] = {}
+        at: Counter[tuple[Kind, Step]] = Counter()
         for step, f in panels:
-            for edge in self._edges(f):
-                place = edge.kind, plus(step, edge.step)
-                at[place] = at.get(place, 0) + 1
-        return {
-            (minus(step, cell), f)
-            for (kind, step), count in at.items()
-            if count == 2
-            for f, cell in self.beside[kind]
-        }
+            at.update((edge.kind, plus(step, edge.step)) for edge in self._edges(f))
+        twice = [place for place, count in at.items() if count == 2]
+        return {(minus(step, cell), f) for kind, step in twice for f, cell in self.beside[kind]}
 
     def _across(self, step: Step, f: int) -> Iterator[Panel]:
         """Panels across the edges of a panel."""
@@ -191,16 +182,12 @@ class Lattice:
             flat = np.abs(bare.dihedrals - np.pi) < FLAT
             of_crease = kinds_of(bare.creases, vertices)
             geometric = np.where(flat, "U", np.array(bare.assignments, np.str_))
-            given = {
-                pair: letters.get(kind, letter)
-                for pair, kind, letter in zip(
-                    map(tuple, bare.creases.tolist()), of_crease, geometric.tolist(), strict=True
-                )
-            }
+            pairs = map(tuple, bare.creases.tolist())
+            each = zip(pairs, of_crease, geometric.tolist(), strict=True)
+            given = {pair: letters.get(kind, letter) for pair, kind, letter in each}
             families = {
                 name: [tuple(bare.creases[k]) for k, kind in enumerate(of_crease) if kind in own_]
                 for name, own_ in self.families().items()
             }
-            return bare.changed(
-                assignments=given, families={k: pairs for k, pairs in families.items() if pairs}
-            )
+            kept = {name: pairs for name, pairs in families.items() if pairs}
+            return bare.changed(assignments=given, families=kept)

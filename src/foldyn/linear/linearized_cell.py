@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -144,10 +145,8 @@ class CellReach:
     def ties(self) -> Hops:
         """Constraints (k, m) of one cell: constraints whose first cell is cell 0."""
         rows = self.patch.case.constraints.rows
-        first = [
-            min(map(tuple, self.steps[self.number[rows.indices[a:b]]].tolist()))
-            for a, b in zip(rows.indptr[:-1], rows.indptr[1:], strict=True)
-        ]
+        steps = [self.steps[self.number[rows.indices[a:b]]] for a, b in pairwise(rows.indptr)]
+        first = [min(map(tuple, own.tolist())) for own in steps]
         kept = [k for k, step in enumerate(first) if not any(step)]
         size = rows.shape[1]
         own = sparse.coo_array(rows[kept] @ self._frames[:size, :size])
@@ -213,10 +212,9 @@ class LinearizedCell:
     @property
     def variables(self) -> dict[str, Any]:
         """Variables of results that describe the state."""
-        angles, axes, points = (
-            np.array([getattr(motion, name) for motion in self.motions])
-            for name in ("angle", "unit", "point")
-        )
+        angles = [motion.angle for motion in self.motions]
+        axes = np.array([motion.unit for motion in self.motions])
+        points = np.array([motion.point for motion in self.motions])
         return {
             "vectors": (("period", "axis"), self.vectors, {"units": "m"}),
             "angles": ("period", np.radians(angles), {"units": "rad"}),
@@ -293,16 +291,12 @@ def linearize_cell(
     damping = sparse.csr_array(
         damping_matrix(case, q, True) + case.rayleigh.matrix(mass, damped_tangent(case, tangent))
     )
-    bloch = Bloch(
-        reach.steps,
-        **{
-            name: hermitian(reach.hops(own), reach.steps, name, patch.first)
-            for name, own in {"stiffness": stiffness, "mass": mass, "damping": damping}.items()
-        },
-        ties=reach.ties,
-        hidden=reach.hidden,
-        held=reach.held,
-    )
+    parts = {"stiffness": stiffness, "mass": mass, "damping": damping}
+    hopping = {
+        name: hermitian(reach.hops(own), reach.steps, name, patch.first)
+        for name, own in parts.items()
+    }
+    bloch = Bloch(reach.steps, **hopping, ties=reach.ties, hidden=reach.hidden, held=reach.held)
     residual = _residual(reach, q)
     if residual > BALANCED:
         _warn(
@@ -375,9 +369,7 @@ def tiled(
         Nodes do not coincide with the copies of their partners.
     """
     place = cell.case.structure.nodes + displacement
-    first = np.array(
-        [images(motions, place[v], -patch.own_step[v]) for v in patch.first.tolist()]
-    ).reshape(-1, 3)
+    first = np.array([images(motions, place[v], -patch.own_step[v]) for v in patch.first.tolist()])
     off = np.linalg.norm(spread(motions, first, patch.own_unit, patch.own_step) - place, axis=1)
     worst = int(off.argmax())
     if off[worst] > SLACK * cell.near:
@@ -419,8 +411,6 @@ def _residual(reach: CellReach, q: NDArray) -> float:
     """Largest force on a free dof of cell 0, as a fraction of the forces that act."""
     force = reach.forces(q)
     left = float(np.abs(reach.projected(force)).max(initial=0.0))
-    at_play = max(
-        float(np.abs(each).max(initial=0.0))
-        for each in (force, reach.body.hinge_forces(q)[reach.rows])
-    )
+    every = np.concatenate([force, reach.body.hinge_forces(q)[reach.rows]])
+    at_play = float(np.abs(every).max(initial=0.0))
     return 0.0 if left <= ROUNDING * float(reach.body.scale().max()) else left / at_play

@@ -23,11 +23,7 @@ from foldyn.values import choice, number, numbers, show
 
 LARGEST = {"random": "rms", "spectrum": "peak"}  # results that hold one value for all times
 MOMENTS = {"load_factor": ", load factor {:.6g}", "time": ", t = {:.6g} s"}
-WORDS = {
-    "center": "at its center",
-    "edge": "at the middle of its edge {}",
-    "corner": "at its corner {}",
-}
+WORDS = {"center": "its center", "edge": "the middle of its edge {}", "corner": "its corner {}"}
 
 
 def margins(
@@ -152,7 +148,7 @@ def place_in(found: xarray.Dataset, point: Any) -> str:
     """Where a point of stresses is, in words."""
     place = WORDS[str(found["point_place"].values[point])]
     number_ = found["point_number"].values[point]
-    return f"panel {found['point_panel'].values[point]} {place.format(number_)}"
+    return f"panel {found['point_panel'].values[point]} at {place.format(number_)}"
 
 
 def _factors(
@@ -182,9 +178,8 @@ def _factors(
                 "strength, of von Mises stresses, instead",
                 "result",
             )
-        if any(
-            not isinstance(own.expansion, float | None) for _, own in case.loads_of(Temperature)
-        ):
+        expansions = [heat.expansion for _, heat in case.loads_of(Temperature)]
+        if not all(isinstance(one, float | None) for one in expansions):
             raise InputError(
                 ": plies that expand by different amounts press on each other, which margins leave "
                 "out; give strength, of von Mises stresses, instead",
@@ -192,9 +187,8 @@ def _factors(
             )
         fibers = material_axes(case.structure.pattern, sheet)[panel[points]]  # type: ignore[index]
         x, y = np.einsum("pai,pi->ap", found["panel_axes"].values[panel[points]], fibers)
-        force, moment = (
-            found[name].values[:, points] for name in ("membrane_force", "bending_moment")
-        )
+        force = found["membrane_force"].values[:, points]
+        moment = found["bending_moment"].values[:, points]
         factor[:, points] = ply_factors(own, force, moment, np.arctan2(y, x), criterion)
     return factor
 

@@ -126,9 +126,8 @@ def modes(
         solver=solver, compared=model_error.beside(case, check_model, state, secant),
     ).result  # fmt: skip
     if check_model and isinstance(case.structure, Superelements):
-        model_error.warn_of_errors(
-            case.structure, found["frequency"].values, found["frequency_error"].values
-        )
+        frequency, error = found["frequency"].values, found["frequency_error"].values
+        model_error.warn_of_errors(case.structure, frequency, error)
     return found
 
 
@@ -232,9 +231,8 @@ def trusted(
         else:
             error = found["model_error"].values[elastic]
         missing = np.ravel(found.attrs.get("missing_frequencies", ()))
-        wrong = model_error.first_doubtful(
-            frequency, np.abs(np.nan_to_num(error, nan=np.inf)) * frequency
-        )
+        off = np.abs(np.nan_to_num(error, nan=np.inf)) * frequency
+        wrong = model_error.first_doubtful(frequency, off)
         holds = min(wrong, float(missing.min(initial=np.inf)), top)
         if holds < top or many < count or not frequency.size or frequency[-1] >= top:
             break

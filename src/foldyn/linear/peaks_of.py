@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 import xarray
@@ -168,9 +169,7 @@ def _bands(
 ) -> list[tuple[float, float]]:
     """Band (Hz) of each peak, up to the lowest points next to it, with limited width."""
     ends = [0, *index.tolist(), len(f) - 1]
-    valleys = [
-        ends[k] + int(np.argmin(size[ends[k] : ends[k + 1] + 1])) for k in range(len(index) + 1)
-    ]
+    valleys = [a + int(np.argmin(size[a : b + 1])) for a, b in pairwise(ends)]
     bands = []
     for k, at in enumerate(index):
         low, high = f[valleys[k]], f[valleys[k + 1]]
@@ -207,9 +206,8 @@ def _with_circles(
         alone = []
     for peak, band in zip(peaks, bands, strict=True):
         try:
-            alone.append(
-                _with_circle(peak, signals.circle_fit(f, curve, band=band, quantity=kind), rate)
-            )
+            fit = signals.circle_fit(f, curve, band=band, quantity=kind)
+            alone.append(_with_circle(peak, fit, rate))
         except (InputError, ComputationError) as error:
             alone.append(replace(peak, note="; ".join(filter(None, (peak.note, str(error))))))
     return alone
@@ -219,9 +217,7 @@ def _with_circle(peak: Peak, fit: signals.CircleFit, rate: float) -> Peak:
     """The peak with its circle fit, excluding the damping of the window."""
     natural, ratio = fit.natural_frequency, fit.damping_ratio
     if rate > 0.0:
-        natural, ratio = (
-            float(value) for value in signals.without_window(natural, ratio, rate=rate)
-        )
+        natural, ratio = map(float, signals.without_window(natural, ratio, rate=rate))
     return replace(
         peak, natural_frequency=natural, damping_ratio=ratio, misfit=fit.misfit,
         frequency_error=fit.frequency_error, damping_error=fit.damping_error,

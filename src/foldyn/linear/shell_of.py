@@ -110,12 +110,8 @@ def superelements_of(case: Case, **options: Any) -> Case:
 
 def shared_options(structure: Discretized, options: type) -> dict[str, Any]:
     """Options of bars and hinges that another model takes, too: creases, clamps, rigid panels."""
-    own = {item.name for item in fields(structure.options)} - MESH
-    return {
-        item.name: getattr(structure.options, item.name)
-        for item in fields(options)
-        if item.name in own
-    }
+    known = {item.name for item in fields(options)} - MESH
+    return {name: value for name, value in vars(structure.options).items() if name in known}
 
 
 def with_structure(case: Case, structure: Discretized) -> Case:

@@ -151,9 +151,8 @@ def spectrum_response(
         _warn_of_mass(axis, shock.covered)
     frequency = np.sqrt(modes.basis.values[modes.basis.inertia > 0.0].clip(0.0)) / TURN
     warn_beyond(case.structure, frequency[frequency <= top], "mode", linear=True)
-    found = {
-        name: {"peak": np.sqrt(squared_parts(name, own.clip(0.0)))} for name, own in squares.items()
-    }
+    summed = {name: squared_parts(name, own.clip(0.0)) for name, own in squares.items()}
+    found = {name: {"peak": np.sqrt(own)} for name, own in summed.items()}
     facts["wall_seconds"] = time.perf_counter() - began
     return random_dataset(
         case, system.displacement, found, facts, np.zeros(0), parts.coordinates, of="spectrum"
@@ -223,10 +222,8 @@ class _Shock:
 
     def square(self, amounts: Amounts) -> NDArray[np.float64]:
         """Squares (k,) of the largest values of a quantity."""
-        largest = sum(
-            self._columns(power, rows.shape[1]) @ rows.T
-            for power, rows in zip(amounts.powers, amounts.rows, strict=True)
-        )
+        each = zip(amounts.powers, amounts.rows, strict=True)
+        largest = sum(self._columns(power, rows.shape[1]) @ rows.T for power, rows in each)
         return np.einsum("ip,ij,jp->p", largest, self._alike, largest)
 
     def _columns(self, power: int, size: int) -> NDArray[np.float64]:

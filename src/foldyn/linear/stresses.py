@@ -390,9 +390,8 @@ class FinerMotion:
         fine, self._equation = matrices(self.case, varying), equation
         both = own.embedded(self.case.structure, equation.both, edges=case.held_edges)
         ties = fine.ties
-        stiffness, mass = (
-            sparse.csc_array(ties.T @ one @ ties) for one in (fine.stiffness, fine.mass)
-        )
+        stiffness = sparse.csc_array(ties.T @ fine.stiffness @ ties)
+        mass = sparse.csc_array(ties.T @ fine.mass @ ties)
         pencil = Pencil(stiffness, mass)
         shift = -BELOW * pencil.scale if len(equation.basis.rigid) else 0.0
         factors = pencil.factorize(shift)

@@ -21,7 +21,7 @@ from foldyn.dynamics import METHODS, Progress, prepare
 from foldyn.dynamics.progress import Reporter
 from foldyn.linear.excitation import Answer, Drive, warn_at
 from foldyn.linear.operating_point import operating_point
-from foldyn.signals import stepped_sine as response_per_drive
+from foldyn.signals import stepped_sine as per_drive
 from foldyn.values import choice, number, whole
 
 Duration = Annotated[float, Check(number, above=0.0, unit="s")]
@@ -220,9 +220,7 @@ def _settled(
         time, motion, state = rig.run(history, block, interval, told, start, state)
         drive = rig.drive.value * history(time)
         # the last sample is the first of the next block
-        response = response_per_drive(
-            time[:-1], drive[:-1], response=motion[:-1], frequency=frequency
-        )
+        response = per_drive(time[:-1], drive[:-1], response=motion[:-1], frequency=frequency)
         if blocks:
             largest, last = max(np.abs(response).max(), 1e-300), change
             change = float(np.abs(response - before).max() / largest)

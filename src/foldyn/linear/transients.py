@@ -145,9 +145,7 @@ def burst_random(rig: Rig, frequency: NDArray, options: BurstRandom, report: Rep
     """
     alpha = rig.case.rayleigh.alpha
     quiet = 1.0 - options.burst
-    interval = (
-        1.0 / (PER_CYCLE * float(frequency[-1])) if options.interval is None else options.interval
-    )
+    interval = options.interval or 1.0 / (PER_CYCLE * float(frequency[-1]))
     record = record_of(frequency, alpha, quiet, interval, options.duration)
     check_records("averages", record, options.averages, len(rig.state))
     count = int(options.burst * record.samples)
@@ -315,13 +313,6 @@ def respond(
             "frequency-response.md#responses-from-simulated-motions",
         )
     estimate = frequency_response(drive, responses, dt=record.interval, estimator=estimator)
-    return Answer(
-        estimate.response[record.lines],
-        {"coherence": estimate.coherence[record.lines]},
-        {
-            "record": record.duration,
-            "interval": record.interval,
-            "window_rate": rate,
-            "left_at_end": left,
-        },
-    )
+    coherence = {"coherence": estimate.coherence[record.lines]}
+    facts = {"record": record.duration, "interval": record.interval, "window_rate": rate}
+    return Answer(estimate.response[record.lines], coherence, facts | {"left_at_end": left})

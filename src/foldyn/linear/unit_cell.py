@@ -190,9 +190,8 @@ class UnitCell:
             return tuple(given), []
         if not pattern.periods:
             try:
-                steps = translations_of(
-                    pattern.vertices, half_edges(pattern.faces, pattern.boundary), near
-                )
+                rim = half_edges(pattern.faces, pattern.boundary)
+                steps = translations_of(pattern.vertices, rim, near)
             except InputError:
                 raise InputError(
                     ": the pattern does not say how it repeats, and no two translations bring its "
@@ -225,11 +224,10 @@ class UnitCell:
             motions.append(motion)
         if not motions:
             raise InputError(": the pattern closes on itself, and has no period", "case")
-        pairs = [
-            (v, w, tuple(int(j == k) for j in range(len(motions))))
-            for rows, k in found
-            for v, w in rows.tolist()
-        ]
+        pairs = []
+        for rows, k in found:
+            step = tuple(int(j == k) for j in range(len(motions)))
+            pairs += [(v, w, step) for v, w in rows.tolist()]
         return tuple(motions), pairs
 
     @property
@@ -488,9 +486,8 @@ def _copies(count: int, dimensions: int, pairs: Sequence[tuple]) -> Copies:
 
 def _check_memory(count: int, dimensions: int) -> None:
     """Refuse more phases than memory can hold; making them takes twice their memory."""
-    check_memory(
-        "count", f"a list of {count:g} phases", 16.0 * count * (dimensions + 1), "take fewer"
-    )
+    needed = 16.0 * count * (dimensions + 1)
+    check_memory("count", f"a list of {count:g} phases", needed, "take fewer")
 
 
 def special_points(vectors: NDArray) -> dict[str, NDArray]:

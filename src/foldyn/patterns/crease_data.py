@@ -127,9 +127,8 @@ def families(
         strange = [pair for pair in pairs if pair not in row]
         if strange:
             raise InputError(f": {strange[0]} is not {what}; name the two vertices of each", place)
-        rows[name] = np.array(
-            sorted(chain.from_iterable(row[pair] for pair in {*pairs})), dtype=np.int64
-        )
+        own = sorted(chain.from_iterable(row[pair] for pair in {*pairs}))
+        rows[name] = np.array(own, dtype=np.int64)
         rows[name].setflags(write=False)
     return rows
 

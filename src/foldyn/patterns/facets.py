@@ -241,9 +241,8 @@ def convex(pattern: Pattern) -> Pattern:
         return pattern
     sides = {edge_of(a, b) for face in (*faces, *more) for a, b in around(face)}
     known = set(map(tuple, pattern.edges.tolist()))
-    return pattern.changed(
-        faces=[*faces, *more], welds=[*pattern.welds.tolist(), *sorted(sides - known)]
-    )
+    welds = [*pattern.welds.tolist(), *sorted(sides - known)]
+    return pattern.changed(faces=[*faces, *more], welds=welds)
 
 
 def what_was_cut(before: Pattern, after: Pattern) -> str:

@@ -165,9 +165,8 @@ class Pattern(Transforms):
         graph = topology.creases, topology.crease_faces, topology.crease_ways, given
         dihedrals, _ = crease_dihedrals(points, normals, *graph)
         flat_there = np.full(len(topology.welds), "F")
-        bent, shut = crease_dihedrals(
-            points, normals, topology.welds, topology.weld_faces, topology.weld_ways, flat_there
-        )
+        joined = topology.welds, topology.weld_faces, topology.weld_ways, flat_there
+        bent, shut = crease_dihedrals(points, normals, *joined)
         if shut.any():
             raise InputError(
                 f": the panels at {tuple(topology.welds[shut][0].tolist())} lie upon each other; "

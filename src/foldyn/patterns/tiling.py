@@ -80,9 +80,8 @@ def glue(vertices: Sequence[NDArray], edges: Sequence[NDArray], tolerance: float
     rank = np.empty(len(first), dtype=np.int64)
     rank[np.argsort(first)] = np.arange(len(first))
     number = rank[label]
-    return Glued(
-        points[np.sort(first)], [number[start:end] for start, end in pairwise(starts)], joined
-    )
+    numbers = [number[start:end] for start, end in pairwise(starts)]
+    return Glued(points[np.sort(first)], numbers, joined)
 
 
 def periods(vertices: NDArray, edges: NDArray, tolerance: float) -> NDArray[np.float64]:

@@ -174,9 +174,8 @@ def build_topology(faces: Faces, vertices: NDArray, welds: Any = ()) -> Topology
     forward = start == low
     clash = forward[pairs[:, 0]] == forward[pairs[:, 1]]
     reverse = _reversals(len(faces), owner[pairs], clash, edges[count == 2])
-    wound = tuple(
-        (face[0], *face[:0:-1]) if turn else face for face, turn in zip(faces, reverse, strict=True)
-    )
+    turned = zip(faces, reverse, strict=True)
+    wound = tuple((face[0], *face[:0:-1]) if turn else face for face, turn in turned)
     forward ^= reverse[owner]
     pairs = np.where(forward[pairs[:, :1]], pairs, pairs[:, ::-1])
     welded = _welded(welds, edges, count > 1)
@@ -192,10 +191,8 @@ def build_topology(faces: Faces, vertices: NDArray, welds: Any = ()) -> Topology
     order = np.argsort(edge, kind="stable")
     pairs, edge = pairs[order], edge[order]
     ways = np.where(forward[pairs], 1, -1) * np.array([1, -1])
-    creases, joined = (
-        (edges[edge[rows]], owner[pairs[rows]], ways[rows])
-        for rows in (~welded[edge], welded[edge])
-    )
+    on = welded[edge]  # rows of welds
+    creases, joined = ((edges[edge[rows]], owner[pairs[rows]], ways[rows]) for rows in (~on, on))
     flipped = tuple(bool(turn) for turn in reverse)
     return Topology(wound, flipped, edges, edges[count == 1], *creases, *joined)
 

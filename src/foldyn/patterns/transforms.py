@@ -269,9 +269,7 @@ def _joined(
     inner : whether to glue edges inside the sheets, too.
     """
     points = [sheet.vertices + shift for sheet, shift in sheets]
-    rims = [
-        sheet.edges if inner else half_edges(sheet.faces, sheet.boundary) for sheet, _ in sheets
-    ]
+    rims = [one.edges if inner else half_edges(one.faces, one.boundary) for one, _ in sheets]
     glued = glue(points, rims, near)
     faces: list[tuple[int, ...]] = []
     letters: dict[tuple[int, int], str] = {}

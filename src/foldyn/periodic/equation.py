@@ -77,12 +77,10 @@ class Tangents:
                 places[k] = term.places
         spread = {k: _spread(basis, *at) for k, at in places.items()}
         self._union = union = np.unique(np.concatenate([place for place, _, _ in spread.values()]))
-        self._own = {
-            k: sparse.csr_array(
-                (weight, (np.searchsorted(union, place), entry)), (len(union), len(places[k][0]))
-            )
-            for k, (place, entry, weight) in spread.items()
-        }
+        self._own = {}
+        for k, (place, entry, weight) in spread.items():
+            at, shape = np.searchsorted(union, place), (len(union), len(places[k][0]))
+            self._own[k] = sparse.csr_array((weight, (at, entry)), shape)
         row, column = np.divmod(self._union, max(size, 1))
         ends = np.searchsorted(row, np.arange(size + 1))
         self._matrix = sparse.csr_array((np.zeros(len(column)), column, ends), (size, size))
@@ -326,12 +324,11 @@ class Equation:
 
     def responses(self, tangent: NDArray, w: float, forces: NDArray, first: int) -> NDArray:
         """Linear responses (h, k) to forces (h, k) of harmonics `first` and higher of w rad/s."""
-        return np.array(
-            [
-                np.linalg.solve(tangent - (j * w) ** 2 * self.mass + 1j * j * w * self.damping, one)
-                for j, one in enumerate(forces, first)
-            ]
-        )
+        found = [
+            np.linalg.solve(tangent - (j * w) ** 2 * self.mass + 1j * j * w * self.damping, one)
+            for j, one in enumerate(forces, first)
+        ]
+        return np.array(found)
 
     @property
     def delays(self) -> bool:

@@ -154,10 +154,9 @@ class Family:
 
         It is the derivative of the balance through the level.
         """
-        up, down = (
-            self.balance.residual(x, omega, self.balance.instants(level))
-            for x, omega, level in (self.own(z, p + PROBE), self.own(z, p - PROBE))
-        )
+        ends = self.own(z, p + PROBE), self.own(z, p - PROBE)
+        at = self.balance.instants
+        up, down = (self.balance.residual(x, omega, at(level)) for x, omega, level in ends)
         return (up - down).ravel() / (2.0 * PROBE)
 
     def solved(self, z: NDArray, p: float) -> Converged | None:

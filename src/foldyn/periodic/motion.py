@@ -272,12 +272,10 @@ def still_case(case: Case) -> Case:
             supports.append(replace(support, value=0.0, history=Constant()))
     contact = case.contact
     if contact is not None:
-        planes = [
-            plane
-            if plane.history in (None, Constant())
-            else replace(plane, motion=None, history=None)
-            for plane in contact.planes
-        ]
+        planes = []
+        for plane in contact.planes:
+            stands = plane.history in (None, Constant())
+            planes.append(plane if stands else replace(plane, motion=None, history=None))
         contact = replace(contact, planes=planes)
     return case.altered(loads=loads, supports=supports, contact=contact)
 
@@ -324,9 +322,8 @@ def coefficients(balance: Balance, guess: Any, omega: float, level: float = 1.0)
 def linear_response(balance: Balance, x: NDArray, omega: float, level: float) -> NDArray:
     """Coefficients (c, k) of one Newton step from a state, with a least slope for soft hinges."""
     equation, fourier = balance.equation, balance.fourier
-    still, little = (
-        balance.residual(x, omega, balance.instants(share * level)) for share in (0.0, LITTLE)
-    )
+    still = balance.residual(x, omega, balance.instants(0.0))
+    little = balance.residual(x, omega, balance.instants(LITTLE * level))
     residual = still + (little - still) / LITTLE
     u = equation.basis @ x[0] + equation.offset
     tangent = equation.projected(equation.body.tangent(u, FLOOR))

@@ -353,10 +353,8 @@ def along(orbits: list[Orbit]) -> dict[str, NDArray]:
     coefficient = np.zeros((len(nodes), max(map(len, nodes)), *nodes[0].shape[1:]), complex)
     for row, own in zip(coefficient, nodes, strict=True):
         row[: len(own)] = own
-    found = {
-        "coefficient": coefficient,
-        "truncation": np.array([orbit.truncation() for orbit in orbits]),
-    }
+    truncation = np.array([orbit.truncation() for orbit in orbits])
+    found = {"coefficient": coefficient, "truncation": truncation}
     if orbits[0].equation.whole is not orbits[0].equation:
         found["reduction"] = np.array([orbit.reduction() for orbit in orbits])
     return found

@@ -317,11 +317,9 @@ class _Tracer:
 
 def _warn_of_folds(found: list[_Found]) -> None:
     """Warn of spurious folds of the Fourier series, at which no multiplier is 1."""
-    at = [
-        f"{one.point.p:.6g}"
-        for one in found
-        if one.bifurcation == FOLD and np.abs(one.floquet - 1.0).min() > APART
-    ]
+    folds = [one for one in found if one.bifurcation == FOLD]
+    spurious = [one for one in folds if np.abs(one.floquet - 1.0).min() > APART]
+    at = [f"{one.point.p:.6g}" for one in spurious]
     if at:
         warn(
             f"harmonics: no multiplier is 1 at the folds at {', '.join(at[:NAMED])}, and a longer "

@@ -331,12 +331,9 @@ def _with_junctions(
     ends: NDArray,
 ) -> tuple[_Creased, _Joined]:  # fmt: skip
     """Add the pieces of junctions, at which the `sides` of triangles meet."""
-    side_of = {
-        (panel, *pair): side
-        for panel, pair, side in zip(
-            mesh.panel[sides // 3].tolist(), ends[sides].tolist(), sides.tolist(), strict=True
-        )
-    }
+    panels, pairs = mesh.panel[sides // 3].tolist(), ends[sides].tolist()
+    each = zip(panels, pairs, sides.tolist(), strict=True)
+    side_of = {(panel, *pair): side for panel, pair, side in each}
 
     def along(edge: Edge, one: int, two: int) -> list[tuple[list[int], Edge]]:
         """Sides of two panels at the pieces of an edge, and the nodes of these."""

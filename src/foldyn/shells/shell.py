@@ -170,19 +170,14 @@ class Shell(Discretized):
         turned, hidden = handed_over(self.model, self.model.per_reach * hidden)
         turning[: len(turned)] += turned
         rows = np.where(hinges < len(self.nodes), hinges, -1)
-        parts = (
-            *parts,
-            moments(np.concatenate([self.nodes, self.sides.wings])[hinges], rows, turning),
-            pushes(self.nodes.size + np.arange(self.rotations), hidden),
-        )
+        points = np.concatenate([self.nodes, self.sides.wings])[hinges]
+        behind = self.nodes.size + np.arange(self.rotations)
+        parts = (*parts, moments(points, rows, turning), pushes(behind, hidden))
         # the last angle of a side gives it the whole rotation
         last = np.append(side[1:] != side[:-1], True)
-        return Swelling(
-            np.zeros(len(self.folds)),
-            joined((part, 0) for part in parts),
-            (stretched, np.where(last, rotated.ravel()[side] / share, 0.0)),
-            (pushed, moment),
-        )
+        turned = np.where(last, rotated.ravel()[side] / share, 0.0)
+        loads = joined((part, 0) for part in parts)
+        return Swelling(np.zeros(len(self.folds)), loads, (stretched, turned), (pushed, moment))
 
     @cached_property
     def folds(self) -> NDArray:
@@ -226,9 +221,8 @@ class Shell(Discretized):
     @cached_property
     def _stiffness(self) -> tuple[NDArray, NDArray]:
         """Stiffness (nt, 3, 3) of triangles: for side strains, J, and for rotations, N m."""
-        membrane, bending = stiffness(
-            self.nodes[self.triangles], self.triangle_panel, self.sheet, self.pattern
-        )
+        corners = self.nodes[self.triangles]
+        membrane, bending = stiffness(corners, self.triangle_panel, self.sheet, self.pattern)
         if self.graded:
             vertices = np.flatnonzero(~smooth_vertices(self.pattern))
             membrane[np.isin(self.triangles, vertices).any(axis=1)] *= STIFF
@@ -286,13 +280,10 @@ class Shell(Discretized):
             own, at = np.flatnonzero(panel == number), points.panel == number
             found = recovery(points.position[at], x[own], points.axes[number], rigid[own])
             sides = (3 * own[:, None] + np.arange(3)).ravel()
-            put = sparse.csr_array(
-                (np.ones(len(sides)), (np.arange(len(sides)), sides)), (len(sides), panel.size * 3)
-            )
+            put = sparse.eye_array(panel.size * 3, format="csr")[sides]
             parts.append([each @ put for each in found])
-        return Recovery(
-            *(sparse.csr_array(sparse.vstack(each)) for each in zip(*parts, strict=True))
-        )
+        whole = (sparse.csr_array(sparse.vstack(each)) for each in zip(*parts, strict=True))
+        return Recovery(*whole)
 
     @cached_property
     def _stretching(self) -> NDArray:

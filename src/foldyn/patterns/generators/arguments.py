@@ -37,9 +37,8 @@ def fold_dihedral(
     """
     if flat_allowed and isinstance(value, Real) and value == 180:
         return 180.0
-    remedy = (
-        ", or 180 (flat)" if flat_allowed else f" ({otherwise})"
-    ) + "; it is the smaller angle of the fold, for valleys and mountains alike"
+    remedy = ", or 180 (flat)" if flat_allowed else f" ({otherwise})"
+    remedy += "; it is the smaller angle of the fold, for valleys and mountains alike"
     return angle_between("dihedral", value, least, 180.0, remedy)
 
 

@@ -74,9 +74,8 @@ def tube(cells: int, a: float, b: float, panel_angle: float, dihedral: float) ->
     sizes(a, b)
     acute("panel_angle", panel_angle)
     dihedral = fold_dihedral(dihedral, flat_allowed=False, otherwise=CLOSED)
-    strip = miura((cells, 1), a, b=b, panel_angle=panel_angle, dihedral=dihedral).vertices.reshape(
-        -1, 3, 3
-    )
+    half = miura((cells, 1), a, b=b, panel_angle=panel_angle, dihedral=dihedral)
+    strip = half.vertices.reshape(-1, 3, 3)
     return np.concatenate([strip, strip[:, 1:2] * [1.0, 1.0, -1.0]], axis=1).reshape(-1, 3)
 
 

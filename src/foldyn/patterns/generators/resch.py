@@ -103,14 +103,10 @@ def resch(cells: Sequence[int] = (3, 3), a: float = 1.0, *, dihedral: float = 12
             families["tile"] += [(right, middle[2]), (tips[2], right)]
     angles = CLOSED if dihedral == 180 else None
     steps = (counts[0], -(counts[0] // 2)), (0, counts[1])
-    periods = [
-        [
-            (v, found[m + i, n + j, k])
-            for (m, n, k), v in found.items()
-            if (m + i, n + j, k) in found
-        ]
-        for i, j in steps
-    ]
+    periods = []
+    for i, j in steps:
+        ahead = [(v, (m + i, n + j, k)) for (m, n, k), v in found.items()]
+        periods.append([(v, found[place]) for v, place in ahead if place in found])
     return assembled("resch", vertices, faces, families, LETTERS, angles, periods=periods)
 
 

@@ -84,9 +84,8 @@ def square_twist(
     if symmetric:
         letters = dict.fromkeys([*center, *second], "M") | dict.fromkeys(first, "V")
         closed = {pair: math.pi if letter == "V" else -math.pi for pair, letter in letters.items()}
-        return Pattern(
-            flat, faces, letters, "symmetric square twist", fold_angles=closed, families=families
-        )
+        name = "symmetric square twist"
+        return Pattern(flat, faces, letters, name, fold_angles=closed, families=families)
     angles = _angles(math.radians(180.0 - dihedral), gamma, center, first, second)
     some = angles if dihedral < 180.0 else _angles(1.0, gamma, center, first, second)
     letters = {pair: "V" if angle > 0.0 else "M" for pair, angle in some.items()}
