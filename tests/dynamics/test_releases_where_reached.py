@@ -183,7 +183,7 @@ def test_failures_and_functions_see_one_motion():
     known = partial.tip.values[np.isfinite(partial.tip.values)]
     assert len(known) > 18 and np.array_equal(known, some.displacement[: len(known), 1, 2])
     assert partial.attrs["releases"] == whole.attrs["releases"]
-    assert "awaited" not in whole and seen[-1].duration == pytest.approx(0.5)
+    assert "_awaited" not in whole and seen[-1].duration == pytest.approx(0.5)
 
 
 # ---------------------------------------------------------------------- files

@@ -177,3 +177,20 @@ def test_no_title_can_end_a_script_element_or_open_a_comment_in_it():
     chart = Charts([chart], BREAKING).html()
     for whole in (live.partition("<main")[0], chart):
         assert "<!--" not in whole
+
+
+def test_what_is_released_vanishes_from_the_sheet():
+    """Samples from which lines and held nodes are gone; nodes that others hold stay."""
+    sheet = fd.discretize(fd.patterns.simple_fold(dihedral=60), fd.Sheet(1e6, 0.25, 0.01, 1.0))
+    supports = [
+        fd.Fix([4, 5]), fd.Fix([0, 1], "z"), fd.Fix([1, 2, 3], "xy", until=0.0045),
+        fd.Bar([(2, 4)], 1.0), fd.Cable([3, (0.0, 0.0, 3.0)], 5.0, until=0.008),
+        fd.Spring(1.0, nodes=[2], until={"crease": 0, "angle": 320.0}),
+    ]  # fmt: skip
+    case = fd.Case(sheet, supports, [fd.Gravity((0, 0, -9.81))])
+    motion = fd.simulate(case, 0.01, method="rk4", interval=0.002)
+    found = stage({"": motion}, {"": case}, "flap", [2]).whole()["results"][0]["gone"]
+    assert found == {"held": {2: 3, 3: 3}, "lines": [None, 4]}
+    assert motion.attrs["released_from"].tolist() == [3, 4]
+    path = fd.trace(case.altered(supports=[*supports[:2], supports[5]]), steps=2)
+    assert "gone" not in stage({"": path}, {"": case}, "flap", [2]).whole()["results"][0]

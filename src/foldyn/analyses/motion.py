@@ -38,6 +38,7 @@ from foldyn.report.album import (
     ByRule,
     by_mass_rule,
     crossing_panels,
+    releases,
     rules,
     shown_nodes,
     visible_scale,
@@ -222,6 +223,7 @@ class MotionAnalysis(Analysis):
             yield from stress_sections(trajectory, album)
         yield Heading("The numbers")
         yield _table(case_file, results, nodes)
+        yield from releases(results)
         yield from crossing_panels(results)
         yield Text(
             "The energy error is the largest imbalance of kinetic + strain + dissipated energy - "

@@ -39,7 +39,15 @@ from foldyn.cases.supports import SUPPORT
 from foldyn.errors import ComputationError, InputError, within
 from foldyn.plots.charts import Chart, Curve
 from foldyn.plots.readings import along, critical_word, evenly, is_loose, main_direction
-from foldyn.report.album import Album, ByRule, crossing_panels, listed, shown_nodes, visible_scale
+from foldyn.report.album import (
+    Album,
+    ByRule,
+    crossing_panels,
+    listed,
+    releases,
+    shown_nodes,
+    visible_scale,
+)
 from foldyn.report.sections import Charts, Heading, Picture, Section, Table, Text, cell
 from foldyn.statics import METHODS, Landscape, Point, Settings, landscape, trace
 from foldyn.statics.newton import settings_of
@@ -279,6 +287,7 @@ class PathAnalysis(Analysis):
         yield _points(case_file, path, nodes[:MOST_COLUMNS], direction, moved)
         if found is not None:
             yield _states(found)
+        yield from releases(results)
         yield from crossing_panels(results)
         yield _run(case_file, path)
         yield Text(

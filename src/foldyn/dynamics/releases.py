@@ -33,7 +33,7 @@ from foldyn.values import number
 SAME = 1e-9  # share of a step or an interval by which times may differ
 EXACT = 1e-8  # share of an interval to which the instant is found at which something is reached
 ALIKE = 1e-6  # share of an interval within which two such instants are one
-WATCH = "awaited"  # quantity that ends a part: nan where something is reached
+WATCH = "_awaited"  # quantity that ends a part: nan where something is reached
 _, DISSIPATED, WORK = AUDITED
 SINCE = (DISSIPATED, WORK, AIR)  # energies that count from the start of a motion
 SUMMED = ("wall_seconds", "flow_energy")  # attributes that add up, besides whole numbers
@@ -234,11 +234,12 @@ class ReleasedMotion(InMemory):
         energy = np.stack([whole[name] for name in names], axis=1)
         scale, off = energy_scale(energy, case.air is not None), energy_error(energy)
         facts |= {"interval": self.interval} if self.interval else {"every_steps": self.every}
-        at = [f"{place} at t = {time:.9g} s" for place, time in released_at(case).items()]
+        gone = {place: time for place, time in released_at(case).items() if time <= self.end}
         facts |= {
             "duration": self.end - self.start,
             "dt": (self.end - self.start) / max(1, facts["steps"]),
-            "releases": "; ".join(at),
+            "releases": "; ".join(f"{place} at t = {at:.9g} s" for place, at in gone.items()),
+            "released_from": np.searchsorted(whole["time"].values, [*gone.values()]),
             "energy_error": float(np.abs(off).max()) / scale if scale else 0.0,
         }
         first, last = parts[0], parts[-1]

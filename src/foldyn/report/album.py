@@ -154,6 +154,13 @@ def computation(
     return by_mass_rule(results, columns, f"{case_file.path.name}: the computation")
 
 
+def releases(results: ByRule) -> list[Section]:
+    """When supports and planes of motions or paths were released; empty if none were."""
+    told = [(f"{rule}: " if len(results) > 1 else "", one) for rule, one in results.items()]
+    given = [rule + one.attrs["releases"] for rule, one in told if one.attrs.get("releases")]
+    return [Text(f"Released: {text}.") for text in given]
+
+
 def crossing_panels(results: ByRule) -> list[Section]:
     """Table of panels that pass through each other in motions or paths; empty if none do."""
     rows, along = [], "time"

@@ -144,10 +144,12 @@ def _facts(parts: list[tuple[Case, xarray.Dataset]], joined: xarray.Dataset) -> 
     found["unstable_points"] = int((negative > 0).sum()) if negative.max() >= 0 else -1
     changes = [own["stability_changes"] for own in attributes if own["stability_changes"] != "none"]
     found["stability_changes"] = "; ".join(changes) or "none"
-    found["releases"] = "; ".join(
-        f"{place} at the load factor {float(part['load_factor'][-1]):.6g}"
-        for (one, part), (other, _) in pairwise(parts)
-        for place in released_at(other).keys() - released_at(one).keys()
-    )
-    found.pop(JUMP, None)
-    return found
+    texts, samples, sample = list[str](), list[int](), 0
+    for (one, part), (other, _) in pairwise(parts):
+        sample += part.sizes["step"]
+        at = f"the load factor {float(part['load_factor'][-1]):.6g}"
+        free = [place for place in released_at(other) if place not in released_at(one)]
+        texts += [f"{place} at {at}" for place in free]
+        samples += [sample for _ in free]
+    del found[JUMP]
+    return found | {"releases": "; ".join(texts), "released_from": samples}

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
+import xarray as xr
 from numpy.typing import NDArray
 
 from foldyn.cases import Case, Latch, Stop
+from foldyn.cases.releases import released, stays, timed
 from foldyn.cases.selection import resolve_creases
 from foldyn.patterns import Pattern
 from foldyn.patterns.topology import Lines
@@ -85,6 +88,22 @@ def held(case: Case) -> list[list[Any]]:
     fixed = np.asarray(case.fixed).reshape(-1, 3)
     axes = np.array(["x", "y", "z"])
     return [[int(node), "".join(axes[fixed[node]])] for node in np.flatnonzero(fixed.any(axis=1))]
+
+
+def gone(case: Case, result: xr.Dataset) -> dict[str, Any]:
+    """Samples from which lines are released, and held nodes; empty if nothing is."""
+    if not result.attrs.get("releases"):
+        return {}
+    places = [text.partition(" ")[0] for text in result.attrs["releases"].split("; ")]
+    samples = np.atleast_1d(result.attrs["released_from"]).tolist()
+    own = timed(case, dict(zip(places, samples, strict=True)))  # samples instead of times
+    nodes: dict[int, int] = {}
+    for sample in sorted({*samples}):
+        still = dict(held(released(own, sample)))
+        for node, _ in held(case):
+            nodes |= {} if node in still or node in nodes else {node: sample}
+    ends = [None if stays(part, math.inf) else part.until for part, *_ in own.polylines()]
+    return {"gone": {"held": nodes, "lines": ends}}
 
 
 def lines(case: Case) -> list[list[Any]]:

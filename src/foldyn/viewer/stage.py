@@ -24,7 +24,7 @@ from foldyn.viewer.arrays import Arrays
 from foldyn.viewer.backdrop import Backdrop
 from foldyn.viewer.orbits import about_orbits, orbits
 from foldyn.viewer.scripts import in_page
-from foldyn.viewer.sheet import bare_sheet, sheet
+from foldyn.viewer.sheet import bare_sheet, gone, sheet
 from foldyn.viewer.states import Field, energies, fields, folding_fields, stress_fields
 from foldyn.viewer.waves import about_waves, waves
 
@@ -99,7 +99,7 @@ def stage(
             alone = len(results) == 1
             found = stresses(result) if stresses and kind in ("motion", "path") else None
             one = _Shown(arrays, f"r{len(listed)}", case, result, name, alone, found)
-            own = {"name": name, "sheet": key, "alone": alone}
+            own = {"name": name, "sheet": key, "alone": alone, **gone(case, result)}
             listed += [own | about for about in _LISTED[kind](one)]
     about |= {"sheets": sheets, "results": listed, **_more(kind, results, cases, nodes)}
     if listed and "way" in listed[0]:  # axes along which supports move

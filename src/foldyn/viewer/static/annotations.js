@@ -23,8 +23,9 @@ export function annotate(context, page, views, { width, height }, tones) {
     const { held, loads, lines, catches } = first.sheet;
     const point = (one) => Array.isArray(one) ? pen.project(...one, [0, 0, 0]) : at(first, one);
     if (few(catches)) catches.forEach((ends) => diamond(pen, ends.map(point)));
-    if (few(lines)) lines.forEach((line) => polyline(pen, line.map(point)));
-    if (few(held)) held.forEach(([node]) => support(pen, at(first, node)));
+    const acts = (from) => from == null || first.sample < from; // until it is released
+    if (few(lines)) lines.forEach((line, k) => acts(first.gone?.lines[k]) && polyline(pen, line.map(point)));
+    if (few(held)) held.forEach(([node]) => acts(first.gone?.held[node]) && support(pen, at(first, node)));
     if (few(loads)) loads.forEach(([node, force]) => arrow(pen, at(first, node), force));
     if (page.node !== null) {
       for (const result of view.results) dot(pen, at(result, page.node), page.color(result));

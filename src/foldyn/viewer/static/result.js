@@ -63,6 +63,7 @@ export class Result {
   // Displacements (3n) at a moment and a phase of what swings.
   moved(moment, phase = 0) {
     const [k, part] = this.place(moment);
+    this.sample = part < 1 ? k : k + 1;
     this.displacement.between(k, part, this.room);
     if (!this.complex) return this.room;
     const half = this.room.length / 2;
