@@ -18,6 +18,7 @@ from scipy.spatial.transform import Rotation
 
 import foldyn as fd
 from foldyn.cases.directions import unit_vector
+from foldyn.cases.reached import ReachedAngle
 from foldyn.materials import BAR_LAWS, HINGE_LAWS
 
 EARLIER = 1e-9  # s, between the histories of the halves of a load
@@ -192,6 +193,12 @@ class Copy:
     def dihedral(self, value: Any) -> Any:
         return (360.0 - np.array(value)).tolist() if self.folds_over else value
 
+    def until(self, value: Any) -> Any:
+        if not isinstance(value, ReachedAngle):
+            return value
+        (crease,), angle = self.creases([value.crease]), self.dihedral(value.angle)
+        return ReachedAngle(crease, float(angle))
+
     def side(self, value: Any) -> Any:
         swapped = {"below": "above", "above": "below"} if self.folds_over else {}
         return swapped.get(value, value)
@@ -277,6 +284,7 @@ FIELDS: Mapping[str, Callable[[Copy, Any], Any]] = {
     **dict.fromkeys(("pressure", "curvature"), Copy.to_front),
     **dict.fromkeys(("moment", "fold_angle"), Copy.of_fold),
     "angle": Copy.dihedral,
+    "until": Copy.until,
     "layers": Copy.layers,
     "side": Copy.side,
     "crease_stiffness": Copy.per_crease,
@@ -292,7 +300,7 @@ FIELDS: Mapping[str, Callable[[Copy, Any], Any]] = {
     **dict.fromkeys(("length_scale_ratio", "fraction", "change", "expansion"), Copy.same),
     **dict.fromkeys(("stiffness", "rest_length", "coefficient", "alpha", "beta"), Copy.same),
     **dict.fromkeys(("bending", "pretension", "stiffness_history", "release"), Copy.same),
-    **dict.fromkeys(("until", "Stop.damping", "sliding_speed", "Bar.area"), Copy.same),
+    **dict.fromkeys(("Stop.damping", "sliding_speed", "Bar.area"), Copy.same),
     **dict.fromkeys(("Bar.modulus", "Bar.law"), Copy.same),
     **dict.fromkeys(("ratios", "times", "onset", "yield_moment", "isotropic"), Copy.same),
     **dict.fromkeys(("kinematic", "barrier_moment", "rate", "friction"), Copy.same),
@@ -320,8 +328,8 @@ def copied(case: fd.Case, symmetry: Symmetry) -> tuple[fd.Case, Copy]:
 # ------------------------------------------------------------------ halves
 HALVED = {
     "vector", "total", "force_per_length", "acceleration", "pressure", "moment", "change",
-    "mass", "Spring.stiffness", "Bar.stiffness", "Bar.area", "Cable.stiffness", "Stop.stiffness",
-    "Latch.stiffness", "coefficient", "BaseMotion.value",
+    "PointMass.mass", "Spring.stiffness", "Bar.stiffness", "Bar.area", "Cable.stiffness",
+    "Stop.stiffness", "Latch.stiffness", "coefficient", "BaseMotion.value",
 }  # fmt: skip
 """Fields in proportion to which a part acts; a part that has none of them is not split."""
 

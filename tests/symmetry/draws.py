@@ -19,6 +19,7 @@ import foldyn as fd
 from foldyn.cases.damping import DAMPINGS
 from foldyn.cases.histories import HISTORIES
 from foldyn.cases.loads import LOADS
+from foldyn.cases.reached import ReachedAngle
 from foldyn.cases.supports import SUPPORTS
 from foldyn.dynamics import METHODS
 from foldyn.dynamics.driver import prepare
@@ -101,6 +102,14 @@ def _line(s: Scene) -> list[Any]:
     return [*line, s.vector(s.size)] if s.rng.random() < 0.5 else line
 
 
+def _until(s: Scene) -> Any:
+    """A time, or an angle of a crease near that at rest."""
+    if s.rng.random() < 0.5:
+        return s.time * s.rng.uniform(0.2, 2.0)
+    crease = int(s.rng.integers(len(s.pattern.creases)))
+    return ReachedAngle(crease, float(np.degrees(s.structure.fold_rest[crease]) + s.about(1.0)))
+
+
 def _layer(s: Scene) -> list[float]:
     return [s.positive(0.5 * s.structure.sheet.thickness), s.positive(1e6), s.positive(1e-8)]
 
@@ -140,7 +149,7 @@ FIELDS: Mapping[str, Callable[[Scene, dict], Any]] = {
     "Stop.damping": lambda s, _: s.positive(0.1 * s.force * s.time),
     "Latch.stiffness": lambda s, _: s.positive(s.moment),
     "release": lambda s, _: s.positive(0.05 * s.moment),
-    "until": lambda s, _: s.time * s.rng.uniform(0.2, 2.0),
+    "until": lambda s, _: _until(s),
     "Impose.value": lambda s, given: s.each(0.5 * SMALL * s.size, given["nodes"]),
     "BaseMotion.value": lambda s, _: s.about(0.5 * SMALL * s.size),
     "history": lambda s, _: drawn(s, HISTORIES.values()),

@@ -98,6 +98,10 @@ def furthest(case: fd.Case, one, other, field) -> float:
     values = (np.moveaxis(found[energies].to_array().values, 0, -1) for found in (one, other))
     pairs.append((*values, STIFF, SMALL * size * force))
     leeway = leeways(one)
+    if one.attrs.get("steps") != other.attrs.get(
+        "steps"
+    ):  # rounding ends a step at an event or not
+        leeway = np.maximum(leeway, TOUCHED)
     return max(
         float((largest(a - b) / leeway).max())
         / (max(float(largest(a).max()), least) or 1.0)
