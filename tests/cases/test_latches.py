@@ -8,7 +8,7 @@ from test_stops import FLAP, LENGTH, MODELS, REST, angle, flap
 
 import foldyn as fd
 from foldyn.dynamics import METHODS
-from foldyn.errors import InputError
+from foldyn.errors import InputError, ModelRangeWarning
 
 K, HELD = 0.5, 40.0  # N m/rad per m: of the crease, and of the latch
 RISE = 3.0  # degrees from rest to the latch
@@ -196,3 +196,26 @@ def test_what_rests_on_a_latch_or_a_stop_stays_at_rest(model, kind):
             stored, rel=1e-6
         )
         assert float(motion.kinetic.max()) < 1e-10 * stored
+
+
+@pytest.mark.parametrize("other", ["latch", "stop"])
+def test_what_acts_on_a_crease_together_is_told_where_panels_are_springs(other):
+    """Two springs k beside panels c: 2k/(1 + c k) instead of 2k/(1 + 2 c k)."""
+    fold, sheet = fd.patterns.simple_fold(dihedral=60), fd.Sheet(1e6, 0.25, 0.01, 1.0)
+    kinds = {"latch": fd.Latch, "stop": fd.Stop}
+    flap = fd.discretize(fold, sheet, preset="plate")
+    hinge = flap.body.sheet.fold_hinges()
+    softness, length = float(hinge.softness[0]), float(hinge.length[0])
+
+    def case(structure, stiffness, angle=302.0):
+        parts = fd.Latch([0], 302.0, stiffness), kinds[other]([0], angle, stiffness=stiffness)
+        return fd.Case(structure, [fd.Fix([4, 5]), fd.Fix([0, 1], "z"), *parts])
+
+    stiff = softness * 5.0 * length
+    ratio = (1.0 + 2.0 * stiff) / (1.0 + stiff)
+    with pytest.warns(ModelRangeWarning, match=f"up to {ratio:.3g} times too stiff"):
+        case(flap, 5.0)
+    case(flap, 0.02 / (softness * length))
+    case(fd.discretize(fold, sheet, preset="n5b8e"), 5.0)
+    stops = fd.Stop([0], 302.0, stiffness=5.0), fd.Stop([0], 290.0, stiffness=5.0)
+    fd.Case(flap, stops)  # on either side

@@ -19,12 +19,13 @@ from foldyn.cases.clamped_edges import supported_points
 from foldyn.cases.contact import Contact
 from foldyn.cases.damping import Damping, Rayleigh, dampings
 from foldyn.cases.history import CONSTANT, History, as_history, factor
-from foldyn.cases.latches import Latch
+from foldyn.cases.latches import Latch, warn_of_company
 from foldyn.cases.loads import LOADS, Gravity, Load
 from foldyn.cases.masses import PointMass, carried_mass
 from foldyn.cases.releases import check_releases
 from foldyn.cases.springs import Bar, Cable, Elastic, Made
 from foldyn.cases.state import State
+from foldyn.cases.stops import Stop
 from foldyn.cases.supports import SUPPORTS, Fix, Impose, Link, Support
 from foldyn.errors import Faults, InputError, ModelRangeWarning, quietly, warn, within
 from foldyn.materials.inelastic_law import VARIABLES
@@ -189,6 +190,10 @@ class Case(Loaded, Damped):
         for name in ("terms", "latches", "carried"):
             with faults.collected():
                 getattr(self, name)
+        stops = [*self._supports(Stop, Latch)]
+        if len(stops) > 1 and not self.structure.linear:
+            with faults.collected():
+                warn_of_company(stops, self.structure)
         for place, load in self._loads():
             acts = load.distributed if self.structure.linear else load.following
             for part in (load.loaded, load.rest_changes, acts):

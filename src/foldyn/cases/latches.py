@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -12,10 +13,13 @@ from foldyn.cases.decode import Part
 from foldyn.cases.loads import PerCrease
 from foldyn.cases.selection import Creases, refuse_linear
 from foldyn.cases.stops import check_open_angles, on_hinges
+from foldyn.errors import ModelRangeWarning, warn
 from foldyn.materials.latching import Latching
 from foldyn.structures.discretized import Discretized
 from foldyn.structures.inelastic_hinges import Remembering
 from foldyn.values import number
+
+MOST = 1.05  # times too stiff, beyond which a warning is due
 
 
 @dataclass(frozen=True)
@@ -73,3 +77,29 @@ class Latch(Part):
             tuple(limit.tolist()), np.inf if self.until is None else self.until,
         )  # fmt: skip
         return Remembering("fold", law, hinges, np.zeros(len(limit)), on.row)
+
+
+def warn_of_company(parts: Sequence[tuple[str, Any]], structure: Discretized) -> None:
+    """Warn where stops and latches act on a crease together, each as if alone beside its panels.
+
+    The panels are springs c in series with all of them: k1 and k2 are (k1 + k2)/(1 + c (k1 + k2)).
+    """
+    folds = structure.body.sheet.fold_hinges()
+    apart, together = np.zeros((2, 2, len(folds.rest)))  # N m/rad, by side: below, above
+    for place, part in parts if folds.softness.any() else ():
+        on = on_hinges(part, structure, place)
+        own = part.stiffness * folds.length[on.row]
+        for above in range(2):
+            acts = np.isin(on.side, 2 * above - 1) | isinstance(part, Latch)
+            together[above, on.row] += acts * own
+            apart[above, on.row] += acts * own / (1.0 + folds.softness[on.row] * own)
+    ratio = apart * (1.0 + folds.softness * together) / np.where(together > 0.0, together, 1.0)
+    if ratio.max(initial=0.0) > MOST:
+        crease = folds.fold[int(np.argmax(ratio.max(axis=0)))]
+        warn(
+            f"crease {crease} has several stops and latches that act together, each as if alone "
+            f"beside panels that are springs in series: together they are up to {ratio.max():.3g} "
+            'times too stiff; give it one, or take preset = "n5b8e"',
+            "supports.md#latches",
+            ModelRangeWarning,
+        )

@@ -175,8 +175,8 @@ def judged(
 def warn_of(doubts: str) -> None:
     """Warn about modes or bands that are far off, alone, or missing; not if there is no doubt."""
     if doubts:
-        place = "superelements.md#bars-and-hinges-beside-them"
-        warn(f"{doubts}: {LINEAR}", place, ModelRangeWarning)
+        text = f"{doubts}: {LINEAR}"
+        warn(text, "superelements.md#bars-and-hinges-beside-them", ModelRangeWarning)
 
 
 def _far_off(name: str, errors: NDArray) -> str:
