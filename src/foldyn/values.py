@@ -88,7 +88,7 @@ def shortened(text: str) -> str:
 
 def nearest(word: str, known: Iterable[str]) -> str | None:
     """The known word closest to `word`, if any is close."""
-    close = difflib.get_close_matches(word[:SHOWN], list(known), n=1, cutoff=0.6)
+    close = difflib.get_close_matches(str(word)[:SHOWN], list(known), n=1, cutoff=0.6)
     return close[0] if close else None
 
 

@@ -118,12 +118,12 @@ analysis.stability = 1: must be true or false
 analysis.until = 0.1: must be a table
 analysis.until = { nodes = 7, axis = "x", displacement = 0.1 } | analysis.until.nodes: unknown
     key; did you mean 'node'? known keys: node, axis, displ
-analysis.until = { node = 99, axis = "x", displacement = 0.1 } | analysis.until.node = [99]: node
+analysis.until = { node = 99, axis = "x", displacement = 0.1 } | analysis.until.node = 99: node
     99 is out of range; this structure has nodes 0 to 12
 analysis.until = { node = 7, axis = "-x", displacement = 0.1 } | analysis.until.axis = "-x": must
     be one of "x", "y" and "z"
 analysis.until = { node = 7, axis = "x", displacement = 0 } | analysis.until.displacement = 0:
-    is reached at rest; give another
+    is the value at rest; give another
 loads[0].history = { kind = "step" }: a path has no time; leave it out: what loads and
 supports[0] = { nodes = [0], axis = "x", displacement = 1, history = { kind = "step" } } |
     supports[0].history = { kind = "step" }: a path has no time; leave it out

@@ -124,7 +124,7 @@ def test_holds_open_one_after_another():
     case = fd.Case(FLAP, [*HINGED, second, first, third], DOWN)
     motion = fd.simulate(case, 0.2, method="rk4", interval=0.004)
     found = instants(motion)
-    assert list(found) == ["supports[2]", "supports[3]"]
+    assert list(found) == ["supports[3]", "supports[2]"]
     assert found["supports[3]"] < found["supports[2]"]
     t = motion.time.values
     for place, goal in (("supports[3]", 300.7), ("supports[2]", 301.2)):
@@ -264,10 +264,10 @@ def test_files_are_told_what_is_wrong(tmp_path, old, new, message):
 @pytest.mark.parametrize(
     ("until", "message"),
     [
-        ({"node": 2, "axis": "z", "displacement": 0.0}, r"displacement = 0: is reached at rest"),
+        ({"node": 2, "axis": "z", "displacement": 0.0}, r"displacement = 0: is the value at rest"),
         ({"node": 20, "axis": "z", "displacement": 1.0}, r"supports\[2\]\.until\.node.*20"),
         ({"crease": 0, "angle": 300.0}, r"supports\[2\]\.until\.angle.*at rest"),
-        ({"line": 0, "tension": 1.0}, r"supports\[2\]\.until\.line = 0: the case has 0"),
+        ({"line": 0, "tension": 1.0}, r"supports\[2\]\.until\.line = 0: the case has 0 springs"),
         ({"node": 2}, "until"),
         ({"node": 2, "angle": 1.0}, "until"),
     ],
@@ -281,3 +281,92 @@ def test_what_has_no_releases_says_so():
     case = hanging({"node": 1, "axis": "z", "displacement": -0.5})
     with pytest.raises(InputError, match=r"supports\[0\]\.until = .*releases nothing"):
         fd.simulate_many([case], 0.1, interval=0.01)
+
+
+# ---------------------------------------------------------------------- what a stranger tried
+def test_loads_may_act_on_what_is_held_at_first():
+    """A payload pulls at the tip, which a support holds until it lets go."""
+    payload = [fd.Force(TIP, (0.0, 0.0, 0.02))]
+    for until in (0.02, {"node": 2, "axis": "z", "displacement": 1e-5}):
+        held = fd.Fix([3], until=until)
+        case = fd.Case(FLAP, [*HINGED, held], [fd.Force([3], (0.0, 0.0, 0.02)), *payload])
+        motion = fd.simulate(case, 0.05, method="rk4", interval=0.005)
+        assert len(instants(motion)) == 1 and motion.attrs["energy_error"] < 1e-3
+
+
+def test_samples_stay_even_far_from_the_start():
+    """Times of a thousand seconds have few digits left for intervals of 25 microseconds."""
+    held = fd.Spring(5.0, nodes=TIP, until={"crease": 0, "angle": 300.8})
+    case = fd.Case(FLAP, [*HINGED, held], DOWN)
+    options = {"method": "rk4", "interval": 2.5e-5}
+    early, late = (fd.simulate(case, 0.035, start=at, **options) for at in (0.0, 1000.0))
+    assert late.sizes["time"] == early.sizes["time"] == 1401
+    assert np.diff(late.time.values) == pytest.approx(2.5e-5, rel=1e-6)
+    u = early.displacement.values
+    assert np.abs(late.displacement.values - u).max() < 1e-6 * np.abs(u).max()
+
+
+def test_the_search_leaves_functions_alone_and_equal_goals_are_sought_once(monkeypatch):
+    held = [fd.Spring(1.0, nodes=[k], until={"crease": 0, "angle": 300.7}) for k in TIP]
+    case, seen = fd.Case(FLAP, [*HINGED, *held], DOWN), []
+
+    def tip(u, v, t):
+        seen.append(t)
+        return u[2, 2]
+
+    options = {"method": "rk4", "interval": 0.005, "sample": {"tip": tip}}
+    motion = fd.simulate(case, 0.05, **options)
+    (instant,) = set(instants(motion).values())
+    assert len(instants(motion)) == 2
+    grid = [*motion.time.values, instant]
+    assert all(np.isclose(t, grid, rtol=0, atol=1e-9).any() for t in seen)
+
+
+def test_a_step_is_checked_at_the_start_only():
+    """The critical step falls a little while the sheet folds."""
+    held = fd.Spring(5.0, nodes=TIP, until={"crease": 0, "angle": 300.7})
+    case = fd.Case(FLAP, [*HINGED, held], DOWN)
+    dt = 0.9993 * fd.critical_step(case)
+    motion = fd.simulate(case, 0.1, method="rk4", dt=dt)
+    assert len(instants(motion)) == 1 and motion.attrs["energy_error"] < 0.05
+
+
+@pytest.mark.parametrize(
+    ("line", "until", "message"),
+    [
+        (fd.Cable([2, (0.0, 0.0, 3.0)], 50.0), -0.1, "a cable does not push"),
+        (fd.Cable([2, (0.0, 0.0, 3.0)], 50.0, pretension=0.5), 0.2, "it has 0.5 N already"),
+    ],
+)
+def test_a_fuse_that_cannot_break_is_refused(line, until, message):
+    fuse = fd.Cable(line.nodes, 50.0, pretension=line.pretension,
+                    until={"line": 0, "tension": until})  # fmt: skip
+    with pytest.raises(InputError, match=rf"supports\[2\]\.until\.tension = .*{message}"):
+        fd.Case(FLAP, [*HINGED, fuse])
+
+
+def test_a_spring_may_be_a_fuse():
+    spring = fd.Spring(5.0, between=[(2, 4)], until={"line": 0, "tension": 0.001})
+    case = fd.Case(FLAP, [*HINGED, spring], [fd.Force(TIP, (0.2, 0.2, 0.3))])
+    motion = fd.simulate(case, 0.02, method="rk4", interval=2e-4)
+    (instant,) = instants(motion).values()
+    x = FLAP.nodes + motion.displacement.values
+    pull = 5.0 * (
+        np.linalg.norm(x[:, 2] - x[:, 4], axis=1) - np.linalg.norm(FLAP.nodes[2] - FLAP.nodes[4])
+    )
+    assert pull[motion.time.values < instant].max() < 0.001
+    stored = motion.strain_springs.values
+    assert stored[1] and not stored[motion.time.values > instant].any() and instant < 0.015
+
+
+@pytest.mark.parametrize(
+    ("until", "message"),
+    [
+        ({"crease": 0, "angle": 170.0, "node": 1}, "waits for one thing; leave out"),
+        ({"node": -1, "axis": "z", "displacement": 1.0}, r"until\.node = -1: node -1"),
+        ({1: 2}, "until"),
+    ],
+)
+def test_mixed_and_odd_tables_are_refused(until, message):
+    with pytest.raises(InputError, match=message):
+        fd.Case(FLAP, [*HINGED, fd.Fix(TIP, until=until)], DOWN)

@@ -86,6 +86,8 @@ def check_vertices(schema: Any, count: int) -> None:
         if not isinstance(given := getattr(part, key, "") or "", str)
     }
     parts = {f"supports[{i}]": part for i, part in enumerate(schema.supports)}
+    planes = schema.contact.planes if getattr(schema, "contact", None) else ()
+    parts |= {f"contact.planes[{i}]": part for i, part in enumerate(planes)}
     for place, part in {**parts, "analysis": schema.analysis}.items():
         node = getattr(getattr(part, "until", None), "node", None)
         places |= {} if node is None else {f"{place}.until.node": (node,)}

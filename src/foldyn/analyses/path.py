@@ -378,7 +378,8 @@ def _points(
     drawn = plots.chosen_points(path, case_file.output.shapes or 4)
     rows = sorted({*special, *drawn, *evenly(path, MOST_ROWS)})
     shares = plots.energy_shares(path)
-    total = sum(path[f"strain_{name}"].values for name in shares)
+    keys = [f"strain_{name}" if f"strain_{name}" in path else name for name in shares]
+    total = sum(path[key].values for key in keys)
     columns = {"load factor": path["load_factor"].values}
     if moved is not None:
         columns[f"moved along {moved[1]} (m)"] = along(path, *moved)

@@ -299,8 +299,8 @@ class Case(Loaded, Damped):
         some = any(isinstance(support, Bar | Cable) for support in self.supports)
         return self.elastic_body.find(SpringsTerm) if some else None
 
-    def polylines(self) -> list[tuple[Elastic, NDArray[np.int64], NDArray[np.float64]]]:
-        """Springs between nodes, bars and cables: the support, and nodes and rest positions.
+    def polylines(self) -> list[tuple[str, Elastic, NDArray[np.int64], NDArray[np.float64]]]:
+        """Springs between nodes, bars and cables: place, support, nodes and rest positions.
 
         Nodes (k,) are negative where a point (k, 3), m, stands still.
         """
@@ -309,7 +309,7 @@ class Case(Loaded, Damped):
             for place, part in self._supports(Elastic):
                 made = Made(self.structure)
                 part.add_to(made, place)
-                found += [(part, *points) for points in made.points]
+                found += [(place, part, *points) for points in made.points]
         return found
 
     def pressed(self, tension: NDArray, named: Callable[[int], str]) -> None:

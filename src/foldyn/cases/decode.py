@@ -261,9 +261,8 @@ class PartOf(Check):
         others = [key for key in table if key not in keys[kind]]
         if others:
             first = next(key for key in own if key in keys[kind])
+            each = f", or write [[{self.section}]] for each" if self.section else ""
             raise InputError(
-                f": {kind.apart}; leave out {' and '.join(others)}, or write [[{self.section}]] "
-                "for each",
-                f"{name}.{first}",
+                f": {kind.apart}; leave out {' and '.join(others)}{each}", f"{name}.{first}"
             )
         return kind

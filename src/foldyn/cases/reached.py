@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, ClassVar
 
@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 from foldyn.arguments import Check
 from foldyn.cases.decode import Part, PartOf
 from foldyn.cases.directions import AXES, Axis
-from foldyn.cases.selection import resolve_creases, resolve_nodes
+from foldyn.cases.selection import in_range
 from foldyn.errors import InputError
 from foldyn.json_schema import Schema, any_of
+from foldyn.mechanics.springs import SpringsTerm
 from foldyn.structures.mesh import hinge_angles
 from foldyn.values import number, whole
 
@@ -26,7 +27,7 @@ Factors = Callable[[Any], float]
 class Reached(Part):
     """Base of frozen data classes that name a quantity and a value that it reaches.
 
-    It has reached the value once it is at least as far from its value at rest, on the same side.
+    It has reached the value once it is as far from rest as the value, on the same side, or farther.
 
     Attributes
     ----------
@@ -35,23 +36,34 @@ class Reached(Part):
     """
 
     goal: ClassVar[str]
+    apart = "a release, or the end of a path, waits for one thing"
 
     def check(self, case: Any) -> None:
         """Refuse numbers that the case does not have."""
         raise NotImplementedError
 
-    def measured(self, case: Any, displacement: NDArray, factors: Factors) -> float:
-        """The quantity at displacements (n, 3), m."""
+    def measured(
+        self, case: Any, displacement: NDArray, factors: Factors, gone: Collection[str]
+    ) -> float:
+        """The quantity at displacements (n, 3), m; gone : places of what is released."""
         raise NotImplementedError
 
-    def share(self, case: Any) -> Callable[[NDArray, Factors], float]:
-        """Function of displacements (n, 3), m, and factors: 0 at rest, 1 where it is reached."""
+    def share(self, case: Any) -> Callable[..., float]:
+        """Share of the way from rest: 1 where the value is reached.
+
+        The function returned takes displacements (n, 3), m, factors of histories, and the places of
+        what is released.
+        """
         self.check(case)
-        rest = self.measured(case, np.zeros_like(case.structure.nodes), lambda history: 0.0)
+        rest = self.measured(case, np.zeros_like(case.structure.nodes), lambda history: 0.0, ())
         goal = getattr(self, self.goal)
         if math.isclose(goal, rest):
-            raise InputError(f" = {goal:g}: is reached at rest; give another", self.goal)
-        return lambda u, factors: (self.measured(case, u, factors) - rest) / (goal - rest)
+            raise InputError(f" = {goal:g}: is the value at rest; give another", self.goal)
+
+        def share(u: NDArray, factors: Factors, gone: Collection[str] = ()) -> float:
+            return (self.measured(case, u, factors, gone) - rest) / (goal - rest)
+
+        return share
 
 
 @dataclass(frozen=True)
@@ -76,9 +88,11 @@ class ReachedDisplacement(Reached):
 
     def check(self, case: Any) -> None:
         """See `Reached`."""
-        resolve_nodes(case.structure, (self.node,), "node")
+        in_range("node", self.node, len(case.structure.nodes), "node")
 
-    def measured(self, case: Any, displacement: NDArray, factors: Factors) -> float:
+    def measured(
+        self, case: Any, displacement: NDArray, factors: Factors, gone: Collection[str]
+    ) -> float:
         """See `Reached`."""
         return float(displacement[self.node, AXES.index(self.axis)])
 
@@ -102,9 +116,11 @@ class ReachedAngle(Reached):
 
     def check(self, case: Any) -> None:
         """See `Reached`."""
-        resolve_creases(case.structure, (self.crease,), "crease")
+        in_range("crease", self.crease, len(case.structure.folds), "crease")
 
-    def measured(self, case: Any, displacement: NDArray, factors: Factors) -> float:
+    def measured(
+        self, case: Any, displacement: NDArray, factors: Factors, gone: Collection[str]
+    ) -> float:
         """See `Reached`."""
         hinge = case.structure.folds[[self.crease]]
         return float(np.degrees(hinge_angles(case.structure.nodes + displacement, hinge))[0])
@@ -129,21 +145,28 @@ class ReachedTension(Reached):
 
     def check(self, case: Any) -> None:
         """See `Reached`."""
-        count = 0 if case.lines is None else len(case.lines.limits)
-        if self.line >= count:
+        term = case.elastic_body.find(SpringsTerm)
+        slack = () if term is None else term.springs.lines.slack
+        if self.line >= len(slack):
             raise InputError(
-                f" = {self.line}: the case has {count} springs, bars and cables with a tension, "
-                "counted from 0, and needs a bar or cable among them",
+                f" = {self.line}: the case has {len(slack)} springs between nodes, bars and "
+                "cables, counted from 0",
                 "line",
             )
+        if self.tension < 0.0 and slack[self.line]:
+            raise InputError(f" = {self.tension:g}: a cable does not push; give more", "tension")
 
-    def measured(self, case: Any, displacement: NDArray, factors: Factors) -> float:
+    def measured(
+        self, case: Any, displacement: NDArray, factors: Factors, gone: Collection[str]
+    ) -> float:
         """See `Reached`."""
-        return float(case.lines.at(factors).pulls(displacement)[self.line])
+        place = case.polylines()[self.line][0] if gone else ""
+        pulls = case.elastic_body.term(SpringsTerm).at(factors).pulls(displacement)
+        return 0.0 if place in gone else float(pulls[self.line])
 
 
 REACHED = PartOf(
-    (ReachedDisplacement, ReachedAngle, ReachedTension), "analysis.until",
+    (ReachedDisplacement, ReachedAngle, ReachedTension), "",
     "node, axis and displacement, crease and angle, or line and tension",
 )  # fmt: skip
 """What a path reaches at its end, in a case file and as an argument."""
@@ -167,6 +190,6 @@ class _Until(PartOf):
 
 
 Until = Annotated[
-    float | Reached | Mapping[str, Any] | None, _Until(REACHED.kinds, "supports", REACHED.asked)
+    float | Reached | Mapping[str, Any] | None, _Until(REACHED.kinds, "", REACHED.asked)
 ]
 """Time (s), or what is reached, at which a part of a case is released; see `releases`."""

@@ -188,7 +188,7 @@ def prepared(
         )
     duration = number("duration", duration, above=0.0)
     start = float(number("start", given.get("start", 0.0), unit="s"))
-    if waiting(case) or any(time < start + duration for time in release_times(case)):
+    if waiting(case) or any(time < start + duration for time in release_times(case).values()):
         given |= {"method": method, "start": start}
         return prepare_released(case, duration, prepare, **given)
     return prepare(case, duration, method, **given)

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from time import perf_counter
 from typing import Any
 
 import numpy as np
@@ -14,7 +15,8 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from foldyn.cases import Case, State
-from foldyn.cases.releases import awaited, release_times, released, released_at, stays, timed
+from foldyn.cases.reached import Reached
+from foldyn.cases.releases import release_times, released, waiting
 from foldyn.dynamics import timing
 from foldyn.dynamics.audit import AIR, AUDITED, audited, energy_error, energy_scale
 from foldyn.dynamics.in_memory import InMemory
@@ -22,7 +24,7 @@ from foldyn.dynamics.initial import initial_state
 from foldyn.dynamics.motion import Motion
 from foldyn.dynamics.progress import Progress, Reporter
 from foldyn.dynamics.sampling import check_given
-from foldyn.errors import ComputationError, MotionInterrupted, quietly, told_once
+from foldyn.errors import ComputationError, InputError, MotionInterrupted, quietly, told_once
 from foldyn.results.attributes import OWN
 from foldyn.results.crossings import crossings_of
 from foldyn.results.dataset import result_dataset, stage_times
@@ -78,51 +80,80 @@ class ReleasedMotion(InMemory):
 
     kind = "a motion with releases"
 
-    def _between(self, case: Case) -> dict[float, float]:
-        """Releases of a case between samples (s), with their numbers of intervals."""
-        inside = [time for time in release_times(case) if self.start < time < self.end]
-        steps = {time: (time - self.start) / (self.interval or math.inf) for time in inside}
-        return {time: own for time, own in steps.items() if abs(own - round(own)) > SAME}
+    @cached_property
+    def _waiting(self) -> dict[Reached, tuple[list[str], Callable[..., float]]]:
+        """What the case waits for: places of what it releases, and its share of the way."""
+        found = waiting(self.case).items()
+        return {until: (places, until.share(self.case)) for until, places in found}
 
-    def _stop(self, case: Case, now: float) -> float:
-        """End (s) of the part of a case's motion that begins now."""
+    def _reached(
+        self, times: Mapping[str, float], now: float, u: NDArray, at: float
+    ) -> list[Reached]:
+        """What is newly reached at displacements (n, 3), m, and a time (s) of the part from now."""
+        gone, factors = _gone(times, now), _factors(at)
+        return [
+            until
+            for until, (places, share) in self._waiting.items()
+            if places[0] not in times and share(u, factors, gone) >= 1.0
+        ]
+
+    def _release(self, times: dict[str, float], now: float, state: State | None) -> None:
+        """Add the time of what a state releases at once."""
+        u = (state or State()).of_nodes("displacement", self.case.structure.nodes.shape)
+        while reached := self._reached(times, now, u, now):
+            times |= {place: now for until in reached for place in self._waiting[until][0]}
+
+    @property
+    def _near(self) -> float:
+        """Share of an interval by which times may differ, with their rounding."""
+        rounding = 8.0 * np.finfo(float).eps * max(abs(self.start), abs(self.end))
+        return SAME + (rounding / self.interval if self.interval else 0.0)
+
+    def _between(self, times: Mapping[str, float]) -> dict[float, float]:
+        """Releases between samples (s), with their numbers of intervals."""
+        inside = [time for time in times.values() if self.start < time < self.end]
+        steps = {time: (time - self.start) / (self.interval or math.inf) for time in inside}
+        return {time: own for time, own in steps.items() if abs(own - round(own)) > self._near}
+
+    def _stop(self, times: Mapping[str, float], now: float) -> float:
+        """End (s) of the part that begins now."""
         beside = [
             self.start + near(steps) * self.interval
-            for steps in self._between(case).values()
+            for steps in self._between(times).values()
             for near in (math.floor, math.ceil)
         ]
-        return min(t for t in (*release_times(case), *beside, self.end) if now < t <= self.end)
+        return min(t for t in (*times.values(), *beside, self.end) if now < t <= self.end)
 
     @cached_property
     def first(self) -> Motion:
         """The first part."""
-        case = self._begun(self.case, self.start, self.initial)
-        return self._part(case, self.start, self._stop(case, self.start), self.initial)
-
-    def _begun(self, case: Case, now: float, state: State | None) -> Case:
-        """The case without what a state releases at once."""
-        u = (state or State()).of_nodes("displacement", case.structure.nodes.shape)
-        while reached := _reached(awaited(case, now), u, now):
-            case = timed(case, dict.fromkeys(reached, now))
-        return case
+        times = release_times(self.case)
+        self._release(times, self.start, self.initial)
+        return self._part(times, self.start, self._stop(times, self.start), self.initial)
 
     def _part(
-        self, case: Case, now: float, stop: float, state: State | None, watched: bool = True
-    ) -> Motion:
-        """Part of a case's motion, from a state; if watched, it ends where something is reached."""
+        self, times: Mapping[str, float], now: float, stop: float, state: State | None,
+        watched: bool = True,
+    ) -> Motion:  # fmt: skip
+        """Part of the motion, from a state; if watched, it ends where something is reached."""
         length, dt = stop - now, self.longest
+        if self.interval and abs(count := round(length / self.interval)):
+            exact = count * self.interval
+            length = exact if abs(exact - length) <= self._near * self.interval else length
         if dt is not None and abs(length - round(length / dt) * dt) > SAME * length:
             dt = length / math.ceil(length / dt)
-        sample, shares = self.sample, awaited(case, now) if watched else {}
-        if shares:
+        given: dict[str, Any] = {"sample": self.sample if watched else {}}
+        if watched and any(places[0] not in times for places, _ in self._waiting.values()):
 
             def watch(u: NDArray, v: NDArray, time: float) -> float:
-                return math.nan if _reached(shares, u, time) else 0.0
+                return math.nan if self._reached(times, now, u, time) else 0.0
 
-            sample = {**sample, WATCH: watch}
+            given["sample"] = {**self.sample, WATCH: watch}
+        if dt is not None and now > self.start and not self.first.method.adaptive:
+            given["force"] = True  # the user's step, which the first part has checked
         return self.prepare(
-            released(case, now), length, initial=state, start=now, dt=dt,
-            interval=min(self.interval, length) or None, sample=sample,
+            released(self.case, _gone(times, now)), length, initial=state, start=now, dt=dt,
+            interval=min(self.interval, length) or None, **given,
         )  # fmt: skip
 
     @property
@@ -137,64 +168,90 @@ class ReleasedMotion(InMemory):
         return 1 + round((self.end - self.start) / spacing)
 
     def _computed(self, report: Reporter) -> xarray.Dataset:
-        parts: list[tuple[float, xarray.Dataset]] = []
-        now, state, motion = self.start, self.initial, self.first
-        case = self._begun(self.case, now, state)
+        parts, times = list[tuple[float, xarray.Dataset]](), release_times(self.case)
+        began = perf_counter()
         with told_once():
-            while True:
-                try:
-                    result = motion.run(partial(self._tell, report, now))
-                except (ComputationError, MotionInterrupted) as error:
-                    ended = isinstance(error, ComputationError)
-                    if ended and (times := self._instants(case, now, error.partial)):
-                        case = timed(case, times)
-                    else:
-                        if error.partial is not None and error.partial.sizes["time"]:
-                            error.partial = self._joined(case, [*parts, (now, error.partial)])
-                        raise
-                else:
-                    parts.append((now, result))
-                    now, state = self._stop(case, now), initial_state(result)
-                    if now in release_times(case):  # forces change: methods start afresh
-                        state = replace(state, continuation=None)
-                    if now >= self.end:
-                        break
-                case = self._begun(case, now, state)
-                motion = self._part(case, now, self._stop(case, now), state)
-        return self._joined(case, parts)
+            try:
+                self._follow(report, parts, times)
+            except InputError as error:
+                if not parts:
+                    raise
+                at = f"after a release, at t = {float(parts[-1][1]['time'][-1]):.6g} s"
+                raise ComputationError(f"{at}: {error}", self._joined(parts, times)) from None
+            except (ComputationError, MotionInterrupted) as error:
+                error.partial = self._joined(parts, times) if parts else None
+                raise
+            except KeyboardInterrupt:
+                kept = self._joined(parts, times) if parts else None
+                raise MotionInterrupted("interrupted between two parts", kept) from None
+        return self._joined(parts, times).assign_attrs(wall_seconds=perf_counter() - began)
 
-    def _instants(self, case: Case, now: float, result: xarray.Dataset | None) -> dict[str, float]:
-        """Time (s) at which something was first reached, by the places that it releases."""
-        shares = awaited(case, now)
-        if result is None or not shares:
-            return {}
-        times, moved = result["time"].values.tolist(), result["displacement"].values
-        reached = [_reached(shares, *at) for at in zip(moved, times, strict=True)]
-        if not any(reached):
-            return {}
-        k, places = next((k, places) for k, places in enumerate(reached) if places)
-        state = replace(initial_state(result, k - 1), continuation=None)
+    def _follow(
+        self, report: Reporter, parts: list[tuple[float, xarray.Dataset]], times: dict[str, float]
+    ) -> None:
+        """Add the parts of the motion, each with its start, and the times of releases."""
+        now, state, motion = self.start, self.initial, self.first
+        self._release(times, now, state)
+        while True:
+            stop = self._stop(times, now)
+            try:
+                part = motion.run(partial(self._tell, report, now))
+            except (ComputationError, MotionInterrupted) as error:
+                part, known = error.partial, isinstance(error, ComputationError)
+                after = self._passed(times, now, part) if known and part is not None else 0
+                if part is not None and part.sizes["time"]:
+                    parts.append((now, part.isel(time=slice(0, after or None))))
+                if not after:
+                    raise
+                times |= self._instants(times, now, error.partial, after)
+                del parts[-1]
+            else:
+                parts.append((now, part))
+                now, state = stop, initial_state(part)
+                if now in times.values():  # forces change: methods start afresh
+                    state = replace(state, continuation=None)
+                if now >= self.end:
+                    return
+            self._release(times, now, state)
+            motion = self._part(times, now, self._stop(times, now), state)
+
+    def _passed(self, times: Mapping[str, float], now: float, part: xarray.Dataset) -> int:
+        """Number of the first sample of a part at which something is reached; 0 if nothing is."""
+        at = zip(part["displacement"].values, part["time"].values.tolist(), strict=True)
+        return next((k for k, one in enumerate(at) if self._reached(times, now, *one)), 0)
+
+    def _instants(
+        self, times: Mapping[str, float], now: float, part: xarray.Dataset, after: int
+    ) -> dict[str, float]:
+        """Time (s) between two samples at which something is first reached, by what it releases."""
+        span, moved = part["time"].values[after - 1 : after + 1], part["displacement"].values
+        near = max(ALIKE, self._near) * (span[1] - span[0])
+        state = replace(initial_state(part, after - 1), continuation=None)
         found = {
-            place: self._instant(case, times[k - 1 : k + 1], state, shares[place])
-            for place in places
+            until: self._instant(times, span.tolist(), state, self._waiting[until][1])
+            for until in self._reached(times, now, moved[after], float(span[1]))
         }
-        near = min(found.values()) + ALIKE * (times[k] - times[k - 1])
-        return {place: min(found.values()) for place, time in found.items() if time <= near}
+        first = min(found.values())
+        first = next((float(time) for time in span if abs(first - time) <= near), first)
+        together = [until for until, time in found.items() if time <= first + near]
+        return {place: first for until in together for place in self._waiting[until][0]}
 
     def _instant(
-        self, case: Case, span: Sequence[float], state: State, share: Callable[..., float]
-    ) -> float:
+        self, times: Mapping[str, float], span: Sequence[float], state: State,
+        share: Callable[..., float],
+    ) -> float:  # fmt: skip
         """Time (s) between two samples at which something is reached, from the first one's state.
 
         The motion may start otherwise than it went on: if it is late, the second sample counts.
         """
+        gone = _gone(times, span[0])
 
         def beyond(time: float) -> float:
             u = state.displacement
             if time > span[0]:
-                part = self._part(case, span[0], time, state, watched=False).run()
+                part = self._part(times, span[0], time, state, watched=False).run()
                 u = part["displacement"].values[-1]
-            return share(u, _factors(time)) - 1.0
+            return share(u, _factors(time), gone) - 1.0
 
         with quietly():
             if beyond(span[1]) < 0.0:
@@ -205,17 +262,18 @@ class ReleasedMotion(InMemory):
         report(own._replace(time=now - self.start + own.time, duration=self.end - self.start))
 
     # ------------------------------------------------------------------ one result
-    def _joined(self, case: Case, found: Sequence[tuple[float, xarray.Dataset]]) -> xarray.Dataset:
+    def _joined(
+        self, found: Sequence[tuple[float, xarray.Dataset]], times: Mapping[str, float]
+    ) -> xarray.Dataset:
         """One result of the parts; the sample at the instant of a release is that just after it.
 
-        case : the case with the times of all releases.
         found : the parts, each with the time (s) at which it begins.
+        times : of the releases, s, by place.
         """
-        pieces, parts = list[xarray.Dataset](), [part for _, part in found]
-        names, between = audited(case.energy_groups, case.air is not None), self._between(case)
+        case, pieces, parts = self.case, list[xarray.Dataset](), [part for _, part in found]
+        names, between = audited(case.energy_groups, case.air is not None), self._between(times)
         for now, part in found:
-            acts = partial(stays, time=now)
-            own = placed(case, part, acts, _factors, WATCH)
+            own = placed(case, part, _gone(times, now), _factors, WATCH)
             if pieces:
                 _go_on(own, pieces[-1], names)
             pieces.append(own)
@@ -234,11 +292,12 @@ class ReleasedMotion(InMemory):
         energy = np.stack([whole[name] for name in names], axis=1)
         scale, off = energy_scale(energy, case.air is not None), energy_error(energy)
         facts |= {"interval": self.interval} if self.interval else {"every_steps": self.every}
-        gone = {place: time for place, time in released_at(case).items() if time <= self.end}
+        gone = {place: times[place] for place in sorted(times, key=times.__getitem__)}
+        gone = {place: time for place, time in gone.items() if time <= self.end}
         facts |= {
             "duration": self.end - self.start,
             "dt": (self.end - self.start) / max(1, facts["steps"]),
-            "releases": "; ".join(f"{place} at t = {at:.9g} s" for place, at in gone.items()),
+            "releases": "; ".join(f"{place} at t = {at:.12g} s" for place, at in gone.items()),
             "released_from": np.searchsorted(whole["time"].values, [*gone.values()]),
             "energy_error": float(np.abs(off).max()) / scale if scale else 0.0,
         }
@@ -247,19 +306,19 @@ class ReleasedMotion(InMemory):
         ends |= {name: first[name] for name in ("continued_from",) if name in first}
         data = {name: (own.dims, own.values, own.attrs) for name, own in {**ends, **whole}.items()}
         along = {"time": ("time", whole["time"].values, first["time"].attrs)}
-        result = result_dataset("trajectory", self.case, data, along, facts, stage_times(facts))
+        result = result_dataset("trajectory", case, data, along, facts, stage_times(facts))
         stride = -(-whole.sizes["time"] // max(1, facts["crossing_looks"]))
         return crossings_of(case, whole["displacement"].values, stride).recorded(result)
+
+
+def _gone(times: Mapping[str, float], now: float) -> set[str]:
+    """Places of what is released up to a time (s)."""
+    return {place for place, time in times.items() if time <= now}
 
 
 def _factors(time: float) -> Callable[[Any], float]:
     """Function from a history to its factor at a time (s)."""
     return lambda history: float(history(time))
-
-
-def _reached(shares: Mapping[str, Callable[..., float]], u: NDArray, time: float) -> list[str]:
-    """Places of what is released at displacements (n, 3), m, and a time (s)."""
-    return [place for place, share in shares.items() if share(u, _factors(time)) >= 1.0]
 
 
 def _together(key: str, values: Sequence[Any]) -> Any:

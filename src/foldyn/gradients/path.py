@@ -23,6 +23,7 @@ from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from foldyn.cases import Case
+from foldyn.cases.releases import refuse_releases
 from foldyn.errors import ComputationError, InputError
 from foldyn.gradients.parameters import Differentiated, Gradient, check_known, nothing
 from foldyn.mechanics.pullback import Pullback, refuse_lacking
@@ -247,3 +248,4 @@ def _refuse(case: Case, arguments: Mapping[str, Any]) -> None:
         "an initial state": arguments.get("initial") is not None,
     }
     refuse_lacking("paths", lacks)
+    refuse_releases(case, "a path with gradients", "leave until out")

@@ -47,7 +47,7 @@ def springs_and_masses(
     for kind, text, width in ((cases.Bar, "bar", 2.2), (cases.Cable, "cable", 1.1)):
         lines = [
             np.where(node[:, None] < 0, x, points[node])[None]
-            for part, node, x in polylines
+            for _, part, node, x in polylines
             if isinstance(part, kind)
         ]
         if lines:

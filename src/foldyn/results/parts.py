@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,7 @@ from foldyn.results.quantities import CONTACT, TENSION, energies_of, variable
 
 
 def placed(
-    case: Any, part: xr.Dataset, acts: Callable[[Any], bool],
+    case: Any, part: xr.Dataset, gone: Collection[str],
     factors: Callable[[float], Callable[[Any], float]], *without: str,
 ) -> xr.Dataset:  # fmt: skip
     """Samples of a part, without its facts; zero for what is released.
@@ -24,8 +24,8 @@ def placed(
         The whole case.
     part : xarray.Dataset
         Motion or path of the case without what is released.
-    acts : callable
-        Whether a support or a plane acts in this part.
+    gone : collection of str
+        Places of what is released.
     factors : callable
         Function of the time (s), or of the load factor: a function from a history to its factor.
     *without : str
@@ -38,7 +38,7 @@ def placed(
     own = own.reindex(support=case.reaction_dofs, fill_value=0.0)
     planes = case.contact.planes if case.contact else ()
     if "plane" in own.dims:
-        acting = [k for k, plane in enumerate(planes) if acts(plane)]
+        acting = [k for k in range(len(planes)) if f"contact.planes[{k}]" not in gone]
         own = own.assign_coords(plane=acting).reindex(plane=range(len(planes)), fill_value=0.0)
     sizes = {**own.sizes, "plane": len(planes)}
     for name, one in {**energies_of(case), **(CONTACT if case.contact else {})}.items():
@@ -49,7 +49,7 @@ def placed(
         at = own["time" if along == "time" else "load_factor"].values.tolist()
         moved = zip(at, own["displacement"].values, strict=True)
         pulls = np.array([case.lines.at(factors(x)).pulls(u) for x, u in moved])
-        pulls = pulls * [acts(support) for support, *_ in case.polylines()]
+        pulls = pulls * [place not in gone for place, *_ in case.polylines()]
         own = own.drop_vars("tension", errors="ignore")
         own["tension"] = variable((along, "line"), pulls, TENSION.units, TENSION.text)
     return own.drop_vars(["support", "plane"], errors="ignore")

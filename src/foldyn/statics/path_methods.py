@@ -241,6 +241,7 @@ class PathPlan(NamedTuple):
     steps: int
     first_step: float
     durations: Sequence[float] = ()  # s, of the steps to `factors`; empty without time
+    motion: NDArray | None = None  # (n, 3), m, that a path with a free factor continues
 
 
 def plan_path(

@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Mapping
-from functools import partial
-from itertools import pairwise
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -13,7 +10,7 @@ import xarray
 from numpy.typing import NDArray
 
 from foldyn.cases import Case, State
-from foldyn.cases.releases import awaited, released, released_at, stays, timed
+from foldyn.cases.releases import released, waiting
 from foldyn.errors import ComputationError, InputError, MotionInterrupted, told_once
 from foldyn.results.attributes import OWN
 from foldyn.results.crossings import crossings_of
@@ -28,22 +25,23 @@ DISSIPATED = "dissipated"
 JUMP = "released_work"  # attribute of a part: work of the loads (J) up to its first point
 
 
-def _left(plan: PathPlan, passed: list[float]) -> PathPlan:
-    """What is left of a plan after points at some load factors, from the last of these on."""
-    now, factors = passed[-1], list(plan.factors)
+def _left(plan: PathPlan, part: xarray.Dataset) -> PathPlan:
+    """What is left of a plan after a part, whose motion at its end it continues."""
+    passed, factors = part["load_factor"].values.tolist(), list(plan.factors)
     for factor in passed[1:]:
         if factors and factor == factors[0]:
             del factors[0]
-    steps = max(0, plan.steps - len(passed) + 1)
+    now, steps = passed[-1], max(0, plan.steps - len(passed) + 1)
     if plan.end == now:
         return plan._replace(begin=now, end=None, steps=0)
-    step = plan.first_step if plan.end is None else math.copysign(plan.first_step, plan.end - now)
-    return plan._replace(begin=now, factors=factors, steps=steps, first_step=step)
+    moved = part["displacement"].values[-2:]
+    motion = moved[1] - moved[0] if len(moved) > 1 else None
+    return plan._replace(begin=now, factors=factors, steps=steps, motion=motion)
 
 
 def trace_released(
     follow: Callable[..., xarray.Dataset], case: Case, plan: PathPlan, initial: State | None,
-    until: Callable[[NDArray, float], Any] | None,
+    until: Callable[..., Any] | None,
 ) -> xarray.Dataset:  # fmt: skip
     """Path of a case with parts that are released where something is reached.
 
@@ -54,44 +52,53 @@ def trace_released(
     until : callable, optional
         End of the whole path; `follow` does not look for it at the first point of a part.
     """
-    parts: list[tuple[Case, xarray.Dataset]] = []
+    parts, gone = list[xarray.Dataset](), list[dict[str, float]]()  # load factors by place
+    awaited = [(places, until.share(case)) for until, places in waiting(case).items()]
+    free: dict[str, float] = {}
+
+    def reached(u: NDArray, factor: float) -> dict[str, float]:
+        found = [
+            places
+            for places, share in awaited
+            if places[0] not in free and share(u, _factors(factor), free) >= 1.0
+        ]
+        return {place: factor for places in found for place in places}
 
     def ends(u: NDArray, factor: float) -> bool:
-        return until is not None and len(parts) > 0 and until(u, factor)
+        return until is not None and len(parts) > 0 and until(u, factor, free)
 
+    def watch(u: NDArray, factor: float) -> bool:
+        return ends(u, factor) or bool(reached(u, factor))
+
+    if initial is not None and initial.displacement is not None:
+        free |= reached(np.asarray(initial.displacement), plan.begin)
     with told_once():
         while True:
-            reached = partial(_reached, awaited(case, 0.0))
-            watch = partial(_either, ends, reached)
+            gone.append(dict(free))
             try:
-                part = follow(released(case, 0.0), plan, initial, watch)
-            except (ComputationError, MotionInterrupted) as error:
-                if error.partial is not None:
-                    error.partial = _joined([*parts, (case, error.partial)])
-                raise
-            except InputError as error:
-                if not parts:
+                parts.append(follow(released(case, free), plan, initial, watch))
+            except (ComputationError, MotionInterrupted, InputError) as error:
+                own = getattr(error, "partial", None)
+                kept = [*parts, *([] if own is None else [own])]
+                if not kept:
                     raise
-                when = f"after a release at the load factor {plan.begin:.6g}"
-                raise ComputationError(f"{when}: {error}", _joined(parts)) from None
-            parts.append((case, part))
-            moved, factors = part["displacement"].values, part["load_factor"].values.tolist()
-            free = reached(moved[-1], factors[-1])
-            if ends(moved[-1], factors[-1]) or not free:
-                return _joined(parts)
-            case, plan = timed(case, dict.fromkeys(free, 0.0)), _left(plan, factors)
-            memory = part["memory"].values[-1] if "memory" in part else None
+                whole = _joined(case, kept, gone)
+                if own is not None or isinstance(error, MotionInterrupted):
+                    error.partial = whole  # type: ignore[union-attr]
+                    raise
+                released_now = ", ".join(place for place in free if free[place] == plan.begin)
+                why = f"after the release of {released_now} at {plan.begin:.6g}: {error}"
+                stop = {"status": "stopped", "stopped_because": why}
+                whole.attrs |= stop | {"remedy": "hold what is left, or end the path before"}
+                raise ComputationError(why, whole) from None
+            moved, factors = parts[-1]["displacement"].values, parts[-1]["load_factor"].values
+            at = moved[-1], float(factors[-1])
+            if ends(*at) or not reached(*at):
+                return _joined(case, parts, gone)
+            free |= reached(*at)
+            plan = _left(plan, parts[-1])
+            memory = parts[-1]["memory"].values[-1] if "memory" in parts[-1] else None
             initial = State(displacement=moved[-1], memory=memory)
-
-
-def _reached(shares: Mapping[str, Callable[..., float]], u: NDArray, factor: float) -> list[str]:
-    """Places of what is released at displacements (n, 3), m, and a load factor."""
-    return [place for place, share in shares.items() if share(u, _factors(factor)) >= 1.0]
-
-
-def _either(one: Callable[..., Any], other: Callable[..., Any], *at: Any) -> Any:
-    """Whether one of two functions is true."""
-    return one(*at) or other(*at)
 
 
 def _factors(factor: float) -> Callable[[Any], float]:
@@ -99,17 +106,22 @@ def _factors(factor: float) -> Callable[[Any], float]:
     return lambda history: factor
 
 
-def _joined(parts: list[tuple[Case, xarray.Dataset]]) -> xarray.Dataset:
-    """One result of the parts of a path, each with its case; both points at a release are kept."""
-    (whole, first), pieces = parts[0], list[xarray.Dataset]()
-    for case, part in parts:
-        own = placed(case, part, partial(stays, time=0.0), _factors)
+def _joined(
+    case: Case, parts: list[xarray.Dataset], gone: list[dict[str, float]]
+) -> xarray.Dataset:
+    """One result of the parts of a path; both points at a release are kept.
+
+    gone : load factors of what is released in each part, by places.
+    """
+    pieces, first = list[xarray.Dataset](), parts[0]
+    for free, part in zip(gone, parts, strict=False):
+        own = placed(case, part, free, _factors)
         lost = own[DISSIPATED].values if DISSIPATED in own else np.zeros(own.sizes["step"])
         if pieces:
             before, jump = pieces[-1].isel(step=-1), part.attrs[JUMP]
             done = own["work"].values
             own["work"] = own["work"].copy(data=done - done[0] + float(before["work"]) + jump)
-            gap = sum(float(before[name] - own[name][0]) for name in energies_of(whole))
+            gap = sum(float(before[name] - own[name][0]) for name in energies_of(case))
             lost = lost - lost[0] + float(before[DISSIPATED]) + gap + jump
         known = PATH[DISSIPATED]
         own[DISSIPATED] = variable(("step",), lost, known.units, known.text)
@@ -121,9 +133,9 @@ def _joined(parts: list[tuple[Case, xarray.Dataset]]) -> xarray.Dataset:
     joined = xarray.concat(pieces, "step")
     data = {str(name): (own.dims, own.values, own.attrs) for name, own in joined.items()}
     along = {"load_factor": ("step", joined["load_factor"].values, first["load_factor"].attrs)}
-    result = result_dataset("path", whole, data, along, _facts(parts, joined))
+    result = result_dataset("path", case, data, along, _facts(parts, gone, joined))
     result.attrs |= {key: first.attrs[key] for key in OWN if key in first.attrs}
-    return crossings_of(whole, joined["displacement"].values).recorded(result)
+    return crossings_of(case, joined["displacement"].values).recorded(result)
 
 
 def _unknown(own: xarray.Dataset, other: xarray.DataArray) -> xarray.DataArray:
@@ -134,22 +146,21 @@ def _unknown(own: xarray.Dataset, other: xarray.DataArray) -> xarray.DataArray:
     return xarray.DataArray(np.zeros(shape), dims=other.dims, attrs=other.attrs)
 
 
-def _facts(parts: list[tuple[Case, xarray.Dataset]], joined: xarray.Dataset) -> dict[str, Any]:
+def _facts(
+    parts: list[xarray.Dataset], gone: list[dict[str, float]], joined: xarray.Dataset
+) -> dict[str, Any]:
     """Facts about the whole path."""
-    attributes = [part.attrs for _, part in parts]
-    found = {key: value for key, value in attributes[0].items() if key not in OWN}
+    attributes = [part.attrs for part in parts]
+    found = {key: value for key, value in attributes[0].items() if key not in (*OWN, JUMP)}
     found |= {key: attributes[-1][key] for key in ENDS if key in attributes[-1]}
     found |= {key: sum(own[key] for own in attributes) for key in SUMMED}
     negative = joined["negative_eigenvalues"].values
     found["unstable_points"] = int((negative > 0).sum()) if negative.max() >= 0 else -1
-    changes = [own["stability_changes"] for own in attributes if own["stability_changes"] != "none"]
-    found["stability_changes"] = "; ".join(changes) or "none"
-    texts, samples, sample = list[str](), list[int](), 0
-    for (one, part), (other, _) in pairwise(parts):
-        sample += part.sizes["step"]
-        at = f"the load factor {float(part['load_factor'][-1]):.6g}"
-        free = [place for place in released_at(other) if place not in released_at(one)]
-        texts += [f"{place} at {at}" for place in free]
-        samples += [sample for _ in free]
-    del found[JUMP]
-    return found | {"releases": "; ".join(texts), "released_from": samples}
+    changes = dict.fromkeys(own["stability_changes"] for own in attributes)
+    told = [change for change in changes if change != "none"]
+    found["stability_changes"] = "; ".join(told) or "none"
+    begin = np.cumsum([0, *(part.sizes["step"] for part in parts)])
+    since = {place: int(begin[k]) for k in reversed(range(len(parts))) for place in gone[k]}
+    at = {place: factor for free in gone[: len(parts)] for place, factor in free.items()}
+    found["releases"] = "; ".join(f"{place} at the load factor {at[place]:.6g}" for place in at)
+    return found | {"released_from": [since[place] for place in at]}

@@ -30,7 +30,7 @@ from foldyn.cases.constraints import check_tied
 from foldyn.cases.contact_checks import check_contact, check_driven
 from foldyn.cases.directions import AXES
 from foldyn.cases.reached import REACHED, Reached
-from foldyn.cases.releases import released_at, waiting
+from foldyn.cases.releases import release_times, waiting
 from foldyn.errors import InputError, within
 from foldyn.mechanics.term import Unstrained
 from foldyn.ram_limit import check_memory
@@ -58,13 +58,20 @@ MOVED = 0.3  # nodes that move more than this fraction of the largest motion are
 MOST_NAMED = 8
 
 
-def until_of(given: Any, case: Case) -> Callable[[NDArray, float], Any] | None:
-    """End condition of a path: a function as given, or what is reached there."""
-    if given is None or callable(given):
-        return given
+def until_of(given: Any, case: Case) -> Callable[..., Any] | None:
+    """End condition of a path, as a function of displacements, load factor and what is released."""
+    if given is None:
+        return None
+    if callable(given):
+        return lambda u, factor, gone=(): given(u, factor)
+    if not isinstance(given, Reached | Mapping):
+        raise InputError(
+            f" = {show(given)}: give a function, or a table of {REACHED.asked}", "until"
+        )
+    end = given if isinstance(given, Reached) else REACHED("until", given)
     with within("until."):
-        share = (given if isinstance(given, Reached) else REACHED("until", given)).share(case)
-    return lambda displacement, factor: share(displacement, lambda history: factor) >= 1.0
+        share = end.share(case)
+    return lambda u, factor, gone=(): share(u, lambda history: factor, gone) >= 1.0
 
 
 def trace(
@@ -168,7 +175,7 @@ def trace(
     >>> path.displacement.sel(node=0, axis="x").values.round(4).tolist()
     [-0.0176, -0.0348]
     """
-    for place, time in released_at(of_kind("case", case, Case)).items():
+    for place, time in release_times(of_kind("case", case, Case)).items():
         raise InputError(
             f" = {time:g}: a path has no time: give what is reached then, as in "
             'until = { node = 6, axis = "z", displacement = -0.03 }',
@@ -242,7 +249,11 @@ def _follow(
         if first.point.factor != plan.begin:
             *_, first = walk(solver, first, [plan.begin], False)
         yield first
-        yield from along(solver, first, plan)
+        onward = None
+        if plan.method.rule is not None and plan.motion is not None:
+            there = problem.displacement(first.point.u)
+            onward = first.point.u - problem.state(there - plan.motion, begin)
+        yield from along(solver, first, plan, onward)
 
     adaptive = adaptive_load is not None
     return record(stations(), progress, solver, problem, facts, until, adaptive, watch)

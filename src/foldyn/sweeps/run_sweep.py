@@ -77,7 +77,7 @@ ABOUT: Mapping[str, str] = {
 def names_of(keys: Sequence[str], taken: Sequence[str]) -> list[str]:
     """Short names of keys: the last word of each key, or all its words if that is not unique."""
     short = [_last(key) for key in keys]
-    counts = Counter([*short, *taken, *ABOUT, *CASE_VARIABLES, POINT, "case_file"])
+    counts = Counter([*short, *taken, *ABOUT, *CASE_VARIABLES, POINT, "case_file", "node", "axis"])
     return [
         name if counts[name] == 1 else re.sub(r"\W+", "_", key).strip("_")
         for key, name in zip(keys, short, strict=True)

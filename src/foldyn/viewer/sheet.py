@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -10,7 +9,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from foldyn.cases import Case, Latch, Stop
-from foldyn.cases.releases import released, stays, timed
+from foldyn.cases.releases import released
 from foldyn.cases.selection import resolve_creases
 from foldyn.patterns import Pattern
 from foldyn.patterns.topology import Lines
@@ -95,22 +94,20 @@ def gone(case: Case, result: xr.Dataset) -> dict[str, Any]:
     if not result.attrs.get("releases"):
         return {}
     places = [text.partition(" ")[0] for text in result.attrs["releases"].split("; ")]
-    samples = np.atleast_1d(result.attrs["released_from"]).tolist()
-    own = timed(case, dict(zip(places, samples, strict=True)))  # samples instead of times
+    first = dict(zip(places, np.atleast_1d(result.attrs["released_from"]).tolist(), strict=True))
     nodes: dict[int, int] = {}
-    for sample in sorted({*samples}):
-        still = dict(held(released(own, sample)))
+    for sample in sorted({*first.values()}):
+        still = dict(held(released(case, [place for place in first if first[place] <= sample])))
         for node, _ in held(case):
             nodes |= {} if node in still or node in nodes else {node: sample}
-    ends = [None if stays(part, math.inf) else part.until for part, *_ in own.polylines()]
-    return {"gone": {"held": nodes, "lines": ends}}
+    return {"gone": {"held": nodes, "lines": [first.get(place) for place, *_ in case.polylines()]}}
 
 
 def lines(case: Case) -> list[list[Any]]:
     """Springs between nodes, bars and cables, by nodes and points that stand still, m."""
     return [
         [int(one) if one >= 0 else point.tolist() for one, point in zip(node, x, strict=True)]
-        for _, node, x in case.polylines()
+        for *_, node, x in case.polylines()
     ]
 
 
