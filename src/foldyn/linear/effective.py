@@ -35,17 +35,20 @@ from scipy import sparse
 
 from foldyn.algebra.superlu import SingularTangentError, unsymmetric
 from foldyn.cases import State
-from foldyn.errors import InputError, warn
+from foldyn.errors import InputError, ModelRangeWarning, quietly, warn
 from foldyn.linear.linearized import amplitude_of, slope_change
 from foldyn.linear.linearized_cell import LinearizedCell, linearize_cell
+from foldyn.linear.model_error import DOUBTFUL, beside
 from foldyn.linear.unit_cell import UnitCell
 from foldyn.linear.wave_solver import WaveSolver
 from foldyn.results.dataset import result_dataset
 from foldyn.strength.resultants import for_stresses
+from foldyn.structures.beyond_range import LINEAR
 from foldyn.values import of_kind
 
 STRAINS = ("xx", "yy", "xy")
 BEAM = ("stretch", "twist", "bend_1", "bend_2")
+BLOCKS = "membrane", "coupling", "bending"
 SOLID = ("xx", "yy", "zz", "yz", "xz", "xy")
 PAIRS = np.array([(0, 1), (0, 2), (1, 0), (1, 2), (2, 0), (2, 1)])  # of directions
 SOFT = 1e-12  # stiffness of a strain, relative to the stiffest, below which it counts as zero
@@ -56,6 +59,8 @@ STRAINED = 1e-6  # mean strains below this, by which a state would relax, are ro
 ANGLES = np.linspace(0.0, 180.0, 181)  # degrees
 LEFT = 1e-6  # largest force that relaxing leaves, relative to the forces of the mean strains,
 ROUNDING = 1e-12  # and, of a unit strain, to the stiffest dof
+LEAST = 0.01  # smallest entries that are compared, relative to their row and column
+NONE = 1e-9  # stiffness of a strain, relative to the stiffest, whose entries are not compared
 
 
 def effective(
@@ -64,6 +69,7 @@ def effective(
     *,
     secant: float | None = None,
     load_factor: float = 1.0,
+    check_model: bool = True,
 ) -> xarray.Dataset:
     """Stiffness of the plate, beam or solid that is equivalent to a repeated sheet.
 
@@ -80,6 +86,9 @@ def effective(
         Equilibrium of the repeated sheet, as `fd.linear.relaxed` finds it; by default rest.
     secant, load_factor : float
         As in `bands`.
+    check_model : bool
+        Whether to compare bars and hinges at rest with superelements, where that takes a few
+        seconds at most once the panels are condensed.
 
     Returns
     -------
@@ -102,7 +111,10 @@ def effective(
         counted twice, along the axes of space; `modulus` (direction) and `shear_modulus` (plane),
         Pa; `poissons_ratio` (pair): of "xy", minus the strain along y divided by that along x,
         under a stress along x; `density` (kg/m3). Of all `mean_load`, forces, moments or stresses
-        in the state, whether that is `stable`, and its variables as in `bands`.
+        in the state, whether that is `stable`, and its variables as in `bands`. Of bars and hinges
+        at rest `model_error` (entry): relative errors of entries of the stiffness, such as
+        "bending[xx,yy]", by comparison with superelements; nan for entries C_ij of less than 1 % of
+        sqrt(C_ii C_jj).
 
     Raises
     ------
@@ -115,6 +127,8 @@ def effective(
     FoldynWarning
         The state is unstable, is no equilibrium, or has mean forces; a mean strain costs no energy,
         so that moduli are 0 and Poisson's ratios its own, or nan if there are two.
+    ModelRangeWarning
+        Entries of the stiffness of bars and hinges are more than 5 % off.
 
     Examples
     --------
@@ -134,6 +148,7 @@ def effective(
     weighed = structure.sheet.density is not None
     if not weighed:
         case = replace(case, structure=replace(structure, sheet=structure.sheet.weighed).marked())
+    compared = beside(case, check_model, state, secant, stiffness=True)
     linear = linearize_cell(cell.with_case(case), state, secant, load_factor)
     if not linear.bloch.ties.empty:
         raise InputError(
@@ -141,23 +156,40 @@ def effective(
             "stiffer than the creases",
             "cell",
         )
-    energy = CellEnergy(linear, amplitude_of(secant))
     kind = KINDS[cell.dimensions]
-    frame, size = kind.frame(linear)
-    whole, loads = kind.stiffness(linear, energy, frame)
-    matrix = whole / size
-    stable = _warn_of(linear, kind, matrix, loads / size)
-    found = kind.properties(matrix, loads / size) | {"stable": ((), stable, {})}
+    energy, frame, size, matrix, loads = _relaxed(linear, kind, amplitude_of(secant))
+    stable = _warn_of(linear, kind, matrix, loads)
+    found = kind.properties(matrix, loads) | {"stable": ((), stable, {})}
+    along = kind.coordinates | {"strain": kind.coordinates["load"]}
+    if compared.case is not None:
+        with quietly():
+            other = linearize_cell(cell.with_case(for_stresses(compared.case)), None, None, 1.0)
+            true = _relaxed(other, kind, None)[3]
+        found["model_error"] = "entry", _errors(linear, kind, matrix, true), {"units": "1"}
+        along["entry"] = kind.entries
     if weighed:
         found["density"] = (), energy.mass.sum() / size, {"units": kind.density}
     found["center"] = "axis", energy.center, {"units": "m"}
     found["frame"] = ("own_axis", "axis"), frame, {"units": "1"}
-    along = kind.coordinates | {"strain": kind.coordinates["load"]}
-    facts = {"residual": linear.residual, "wall_seconds": time.perf_counter() - began}
+    facts = {
+        "residual": linear.residual,
+        "not_compared": compared.why,
+        "wall_seconds": time.perf_counter() - began,
+    }
     return result_dataset("effective", cell.case, found | linear.variables, along, facts)
 
 
 # ---------------------------------------------------------------------- mean strains of a cell
+def _relaxed(
+    linear: LinearizedCell, kind: Equivalent, amplitude: float | None
+) -> tuple[CellEnergy, NDArray, float, NDArray, NDArray]:
+    """Energy, frame and size of a cell, and its stiffness (n, n) and loads (n,) per size."""
+    energy = CellEnergy(linear, amplitude)
+    frame, size = kind.frame(linear)
+    whole, loads = kind.stiffness(linear, energy, frame)
+    return energy, frame, size, whole / size, loads / size
+
+
 def _plate_frame(linear: LinearizedCell) -> tuple[NDArray, float]:
     """Axes x, y and normal (3, 3) of a sheet, and the area (m2) of a cell."""
     if any(motion.turns for motion in linear.motions):
@@ -254,11 +286,7 @@ def _solid(linear: LinearizedCell, energy: CellEnergy, frame: NDArray) -> tuple[
 
 def _warn_of(linear: LinearizedCell, kind: Equivalent, matrix: NDArray, loads: NDArray) -> bool:
     """Whether the state is stable; warn if not, of strains without stiffness, of mean forces."""
-    names, straight, size = kind.names, kind.straight, linear.cell.case.structure.pattern.size
-    unit = np.where(np.arange(len(names)) < straight, 1.0, size)  # of curvatures, and twists
-    stiff = np.abs(np.diag(matrix)) / unit**2
-    stiffest = stiff.reshape(2, 3).max(axis=1).repeat(3) if kind.straight == 3 else stiff.max()
-    scale = unit * np.sqrt(stiffest)
+    names, (unit, scale) = kind.names, _scale(linear, kind, matrix)
     values, ways = np.linalg.eigh(matrix / np.outer(scale, scale))
     lowest = WaveSolver(linear.bloch, 1).waves(np.zeros(len(linear.motions))).values[0]
     stable = bool(lowest >= 0.0 and values[0] >= -SOFT * values[-1])
@@ -288,6 +316,37 @@ def _warn_of(linear: LinearizedCell, kind: Equivalent, matrix: NDArray, loads: N
             "effective.md#states",
         )
     return stable
+
+
+def _scale(linear: LinearizedCell, kind: Equivalent, matrix: NDArray) -> tuple[NDArray, NDArray]:
+    """Units (n,) of strains, and with them roots of the stiffness of the stiffest (n,)."""
+    size = linear.cell.case.structure.pattern.size
+    unit = np.where(np.arange(len(kind.names)) < kind.straight, 1.0, size)  # curvatures, twists
+    stiff = np.abs(np.diag(matrix)) / unit**2
+    stiffest = stiff.reshape(2, 3).max(axis=1).repeat(3) if kind.straight == 3 else stiff.max()
+    return unit, unit * np.sqrt(stiffest)
+
+
+def _errors(
+    linear: LinearizedCell, kind: Equivalent, matrix: NDArray, true: NDArray
+) -> NDArray[np.float64]:
+    """Relative errors of `kind.entries`, by comparison with superelements; warns of large ones."""
+    root, upper = np.sqrt(np.diag(true).clip(min=0.0)), np.triu_indices(len(true))
+    none = root < np.sqrt(NONE) * _scale(linear, kind, true)[1]
+    least = np.where(none[:, None] | none, np.inf, LEAST * np.outer(root, root))[upper]
+    own, other = matrix[upper], true[upper]
+    error = np.where(np.abs(other) > least, own / np.where(other, other, 1.0) - 1.0, np.nan)
+    size = np.abs(np.nan_to_num(error))
+    worst, off = int(size.argmax()), int((size > DOUBTFUL).sum())
+    if off:
+        warn(
+            f"{off} of {np.isfinite(error).sum()} entries of the stiffness differ by more than "
+            f"{DOUBTFUL:.0%} from superelements ({kind.entries[worst]} is {own[worst]:.4g}, theirs "
+            f"{other[worst]:.4g}: {error[worst]:+.0%}): {LINEAR}",
+            "effective.md#bars-and-hinges-beside-superelements",
+            ModelRangeWarning,
+        )
+    return error
 
 
 # ---------------------------------------------------------------------- properties
@@ -361,6 +420,15 @@ class Equivalent(NamedTuple):
     straight: int
     density: str
     coordinates: dict[str, Any]
+
+    @property
+    def entries(self) -> list[str]:
+        """Names of the upper triangle of the stiffness, row by row."""
+        load = self.coordinates["load"]
+        blocks = ["stiffness"] if len(load) == len(self.names) else list(BLOCKS)
+        ends = np.transpose(np.triu_indices(len(self.names))).tolist()
+        split = [(*divmod(i, len(load)), *divmod(j, len(load))) for i, j in ends]
+        return [f"{blocks[a + b]}[{load[i]},{load[j]}]" for a, i, b, j in split]
 
 
 KINDS = {

@@ -1,0 +1,111 @@
+"""Effective properties of bars and hinges carry their errors, by comparison with superelements."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+import foldyn as fd
+from foldyn.errors import FoldynWarning, InputError, ModelRangeWarning, quietly
+from foldyn.linear import model_error
+from verification.effective_cells import counts, numbers
+
+pytestmark = [
+    pytest.mark.usefixtures("compared"),
+    pytest.mark.filterwarnings("error::foldyn.errors.FoldynWarning"),
+]
+PAPER = fd.Sheet(3e9, 0.3, 3e-4, density=800.0)
+MIURA = fd.patterns.miura(a=0.03, b=0.03, panel_angle=60, dihedral=100)
+SOFT = 0.02 * PAPER.bending_modulus / 0.03  # N m/rad per m
+
+
+
+
+def cell(pattern=MIURA, sheet=PAPER, model=fd.discretize, **options) -> fd.UnitCell:
+    options = {"crease_stiffness": SOFT, **options}
+    return fd.UnitCell(fd.Case(model(pattern, sheet, **options)))
+
+
+def triangles(model=fd.discretize, crease=SOFT) -> fd.UnitCell:
+    """Eight congruent triangles, whose vertices are high and low as the fields of a board."""
+    i, j = np.indices((3, 3)).reshape(2, -1)
+    points = np.stack([0.03 * i, 0.03 * j, 0.01 * ((i + j) % 2)], axis=1)
+    squares = [(a, a + 3, a + 4, a + 1) for a in (0, 1, 3, 4)]
+    faces = [face for a, b, c, d in squares for face in ((a, b, c), (a, c, d))]
+    case = fd.Case(model(fd.Pattern(points, faces), PAPER, crease_stiffness=crease))
+    return fd.UnitCell(case, vectors=0.06 * np.eye(3)[:2])
+
+
+def test_a_miura_sheet_with_soft_creases_is_right():
+    found, true = fd.effective(cell()), numbers(fd.effective(cell(model=fd.superelements)))
+    own = numbers(found)
+    assert sorted(found.entry.values) == sorted(name for name in own if "," in name)
+    for name, error in zip(found.entry.values, found.model_error.values, strict=True):
+        assert np.isfinite(error) == counts(true, name)
+        if np.isfinite(error):
+            assert error == pytest.approx(own[name] / true[name] - 1.0, abs=1e-9)
+    assert 0.005 < np.nanmax(np.abs(found.model_error)) < 0.02
+    assert "not_compared" not in found.attrs
+
+
+def test_a_sheet_of_triangles_bends_twice_too_stiffly_and_says_so():
+    with pytest.warns(ModelRangeWarning) as caught:
+        found = fd.effective(triangles())
+    (told,) = (str(each.message) for each in caught)
+    true, own = numbers(fd.effective(triangles(fd.superelements))), numbers(found)
+    errors = dict(zip(found.entry.values.tolist(), found.model_error.values, strict=True))
+    assert errors["bending[xx,xx]"] == pytest.approx(1.1, abs=0.02)
+    wrong = re.search(r"\((\S+) is (\S+), theirs (\S+): \+(\d+)%\)", told)
+    assert wrong is not None
+    name, ours, theirs, percent = wrong.groups()
+    assert abs(errors[name]) == pytest.approx(np.nanmax(np.abs(found.model_error)))
+    assert float(ours) == pytest.approx(own[name], rel=1e-3)
+    assert float(theirs) == pytest.approx(true[name], rel=1e-3)
+    assert int(percent) == round(100.0 * (own[name] / true[name] - 1.0))
+    many = sum(abs(each) > 0.05 for each in errors.values())
+    assert told.startswith(f"{many} of {np.isfinite(found.model_error).sum().item()} entries")
+    assert "--model superelements" in told
+    assert "model_error" not in fd.effective(triangles(), check_model=False)  # and no warning
+
+
+def test_what_is_not_compared_says_so(monkeypatch):
+    big = fd.patterns.miura((3, 2), a=0.03, b=0.03, panel_angle=60, dihedral=100)
+    assert "24 panels, more than 16" in fd.effective(cell(big)).attrs["not_compared"]
+    with quietly():  # hinges without a slope, strains without stiffness
+        soft = fd.effective(cell(fold_law="superlinear"))
+    assert "no slope at rest" in soft.attrs["not_compared"]
+    monkeypatch.setattr(model_error, "OF_STIFFNESS", (16, 0))
+    assert "1 different panels, more than 0" in fd.effective(cell()).attrs["not_compared"]
+    rest = fd.State(np.zeros(cell().case.structure.nodes.shape))
+    for found in (
+        fd.effective(cell(), check_model=False),
+        fd.effective(cell(), rest),
+        fd.effective(cell(model=fd.shell, divisions=1)),
+    ):
+        assert "model_error" not in found and "not_compared" not in found.attrs
+    with pytest.raises(InputError, match=r"check_model = 'no'"):
+        fd.effective(cell(), check_model="no")
+
+
+@pytest.mark.matrix
+def test_chains_solids_and_sheets_without_density_are_compared():
+    light = fd.Sheet(3e9, 0.3, 3e-4)
+    tower = fd.patterns.kresling(radius=0.03, height=0.03)
+    for made in (cell(tower), cell(sheet=light)):
+        assert 1e-4 < np.nanmax(np.abs(fd.effective(made).model_error)) < 0.03
+    found = fd.effective(cell(tower))
+    assert found.entry.values[1] == "stiffness[stretch,twist]"
+    assert found.model_error[1] == pytest.approx(
+        found.stretch_twist / fd.effective(cell(tower, model=fd.superelements)).stretch_twist - 1.0
+    )
+
+
+def test_a_strain_that_costs_nothing_has_no_error():
+    """Strips about creases without stiffness."""
+    strip = cell(fd.patterns.simple_fold(a=0.03, b=0.03, dihedral=180), crease_stiffness=0.0)
+    with pytest.warns(FoldynWarning, match="costs no energy"):
+        found = fd.effective(strip)
+    assert np.isnan(found.model_error.sel(entry="stiffness[bend_2,bend_2]"))
+    assert np.nanmax(np.abs(found.model_error)) < 0.01
