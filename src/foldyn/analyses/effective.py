@@ -59,15 +59,10 @@ class EffectiveAnalysis(Analysis):
 
     def prepare(self, case_file: CaseFile, mass: str, changes: Mapping[str, Any]) -> Compute:
         """See `Analysis`."""
-        given = {**self.arguments, **changes}
-        states, check = cell_states(case_file, mass, given), given["check_model"]
+        states = cell_states(case_file, mass, {**self.arguments, **changes})
 
         def compute(progress: bool, begun: Begun) -> xarray.Dataset:
-            found = in_all(
-                states,
-                lambda one: effective(one.cell, check_model=check, **one.arguments()),
-                progress, begun,
-            )  # fmt: skip
+            found = in_all(states, _effective, progress, begun)
             vary = states[0].varied
             return found[0] if vary is None else _joined(case_file.case(mass), vary, found)
 
@@ -98,7 +93,7 @@ class EffectiveAnalysis(Analysis):
             )  # fmt: skip
         yield Heading("The numbers")
         if "model_error" in result:
-            error = 100.0 * np.nanmax(np.abs(result["model_error"].values))
+            error = 100.0 * float(np.abs(result["model_error"]).max())
             yield Text(f"Entries of the stiffness are within {error:.2g} % of superelements'.")
         if several:
             yield _by_state(result)
@@ -119,6 +114,11 @@ class EffectiveAnalysis(Analysis):
         yield Text(MEANING)
 
 
+def _effective(state: Any) -> xarray.Dataset:
+    """Properties in one state."""
+    return effective(state.cell, check_model=state.given["check_model"], **state.arguments())
+
+
 def _joined(case: Case, vary: Varied, found: Sequence[xarray.Dataset]) -> xarray.Dataset:
     """Properties in all states as one result."""
     first, own = found[0], result_dataset("effective", case, {}, {}, {})
@@ -132,7 +132,7 @@ def _joined(case: Case, vary: Varied, found: Sequence[xarray.Dataset]) -> xarray
     }
     facts = {
         "residual": max(one.attrs["residual"] for one in found),
-        "not_compared": next((each for one in found if (each := one.attrs.get("not_compared"))), None),
+        "not_compared": first.attrs.get("not_compared"),
         "wall_seconds": sum(one.attrs["wall_seconds"] for one in found),
     }
     return result_dataset("effective", case, values, along | {"state": coordinate(vary)}, facts)

@@ -38,17 +38,15 @@ from foldyn.cases import State
 from foldyn.errors import InputError, ModelRangeWarning, quietly, warn
 from foldyn.linear.linearized import amplitude_of, slope_change
 from foldyn.linear.linearized_cell import LinearizedCell, linearize_cell
-from foldyn.linear.model_error import DOUBTFUL, beside
+from foldyn.linear.model_error import DOUBTFUL, LINEAR, beside
 from foldyn.linear.unit_cell import UnitCell
 from foldyn.linear.wave_solver import WaveSolver
 from foldyn.results.dataset import result_dataset
 from foldyn.strength.resultants import for_stresses
-from foldyn.structures.beyond_range import LINEAR
 from foldyn.values import of_kind
 
 STRAINS = ("xx", "yy", "xy")
 BEAM = ("stretch", "twist", "bend_1", "bend_2")
-BLOCKS = "membrane", "coupling", "bending"
 SOLID = ("xx", "yy", "zz", "yz", "xz", "xy")
 PAIRS = np.array([(0, 1), (0, 2), (1, 0), (1, 2), (2, 0), (2, 1)])  # of directions
 SOFT = 1e-12  # stiffness of a strain, relative to the stiffest, below which it counts as zero
@@ -59,8 +57,7 @@ STRAINED = 1e-6  # mean strains below this, by which a state would relax, are ro
 ANGLES = np.linspace(0.0, 180.0, 181)  # degrees
 LEFT = 1e-6  # largest force that relaxing leaves, relative to the forces of the mean strains,
 ROUNDING = 1e-12  # and, of a unit strain, to the stiffest dof
-LEAST = 0.01  # smallest entries that are compared, relative to their row and column
-NONE = 1e-9  # stiffness of a strain, relative to the stiffest, whose entries are not compared
+LEAST, NONE = 0.01, 3e-5  # smallest entries, and roots of stiffness, that are compared
 
 
 def effective(
@@ -112,9 +109,9 @@ def effective(
         Pa; `poissons_ratio` (pair): of "xy", minus the strain along y divided by that along x,
         under a stress along x; `density` (kg/m3). Of all `mean_load`, forces, moments or stresses
         in the state, whether that is `stable`, and its variables as in `bands`. Of bars and hinges
-        at rest `model_error` (entry): relative errors of entries of the stiffness, such as
-        "bending[xx,yy]", by comparison with superelements; nan for entries C_ij of less than 1 % of
-        sqrt(C_ii C_jj).
+        at rest `model_error` (row, column): relative errors of the stiffness C, of a sheet
+        [[A, B], [B', D]] with strains and curvatures as rows, by comparison with superelements; nan
+        for entries C_ij of less than 1 % of sqrt(C_ii C_jj).
 
     Raises
     ------
@@ -147,7 +144,7 @@ def effective(
         raise InputError(": has supports or clamped edges, and a free material has none", "cell")
     weighed = structure.sheet.density is not None
     if not weighed:
-        case = replace(case, structure=replace(structure, sheet=structure.sheet.weighed).marked())
+        case = replace(case, structure=structure.altered(sheet=structure.sheet.weighed))
     compared = beside(case, check_model, state, secant, stiffness=True)
     linear = linearize_cell(cell.with_case(case), state, secant, load_factor)
     if not linear.bloch.ties.empty:
@@ -156,40 +153,31 @@ def effective(
             "stiffer than the creases",
             "cell",
         )
+    energy = CellEnergy(linear, amplitude_of(secant))
     kind = KINDS[cell.dimensions]
-    energy, frame, size, matrix, loads = _relaxed(linear, kind, amplitude_of(secant))
-    stable = _warn_of(linear, kind, matrix, loads)
-    found = kind.properties(matrix, loads) | {"stable": ((), stable, {})}
+    frame, size = kind.frame(linear)
+    whole, loads = kind.stiffness(linear, energy, frame)
+    matrix = whole / size
+    stable = _warn_of(linear, kind, matrix, loads / size)
+    found = kind.properties(matrix, loads / size) | {"stable": ((), stable, {})}
     along = kind.coordinates | {"strain": kind.coordinates["load"]}
     if compared.case is not None:
         with quietly():
             other = linearize_cell(cell.with_case(for_stresses(compared.case)), None, None, 1.0)
-            true = _relaxed(other, kind, None)[3]
-        found["model_error"] = "entry", _errors(linear, kind, matrix, true), {"units": "1"}
-        along["entry"] = kind.entries
+            true = kind.stiffness(other, CellEnergy(other, None), frame)[0] / size
+        error = _errors(linear, kind, matrix, true)
+        found["model_error"] = ("row", "column"), error, {"units": "1"}
+        along |= {"row": kind.names, "column": kind.names}
     if weighed:
         found["density"] = (), energy.mass.sum() / size, {"units": kind.density}
     found["center"] = "axis", energy.center, {"units": "m"}
     found["frame"] = ("own_axis", "axis"), frame, {"units": "1"}
-    facts = {
-        "residual": linear.residual,
-        "not_compared": compared.why,
-        "wall_seconds": time.perf_counter() - began,
-    }
+    facts = {"residual": linear.residual, "not_compared": compared.why}
+    facts["wall_seconds"] = time.perf_counter() - began
     return result_dataset("effective", cell.case, found | linear.variables, along, facts)
 
 
 # ---------------------------------------------------------------------- mean strains of a cell
-def _relaxed(
-    linear: LinearizedCell, kind: Equivalent, amplitude: float | None
-) -> tuple[CellEnergy, NDArray, float, NDArray, NDArray]:
-    """Energy, frame and size of a cell, and its stiffness (n, n) and loads (n,) per size."""
-    energy = CellEnergy(linear, amplitude)
-    frame, size = kind.frame(linear)
-    whole, loads = kind.stiffness(linear, energy, frame)
-    return energy, frame, size, whole / size, loads / size
-
-
 def _plate_frame(linear: LinearizedCell) -> tuple[NDArray, float]:
     """Axes x, y and normal (3, 3) of a sheet, and the area (m2) of a cell."""
     if any(motion.turns for motion in linear.motions):
@@ -327,22 +315,17 @@ def _scale(linear: LinearizedCell, kind: Equivalent, matrix: NDArray) -> tuple[N
     return unit, unit * np.sqrt(stiffest)
 
 
-def _errors(
-    linear: LinearizedCell, kind: Equivalent, matrix: NDArray, true: NDArray
-) -> NDArray[np.float64]:
-    """Relative errors of `kind.entries`, by comparison with superelements; warns of large ones."""
-    root, upper = np.sqrt(np.diag(true).clip(min=0.0)), np.triu_indices(len(true))
-    none = root < np.sqrt(NONE) * _scale(linear, kind, true)[1]
-    least = np.where(none[:, None] | none, np.inf, LEAST * np.outer(root, root))[upper]
-    own, other = matrix[upper], true[upper]
-    error = np.where(np.abs(other) > least, own / np.where(other, other, 1.0) - 1.0, np.nan)
-    size = np.abs(np.nan_to_num(error))
-    worst, off = int(size.argmax()), int((size > DOUBTFUL).sum())
-    if off:
+def _errors(linear: LinearizedCell, kind: Equivalent, own: NDArray, true: NDArray) -> NDArray:
+    """Relative errors (n, n) of a stiffness, beside that of superelements; warns of large ones."""
+    root, scale = np.sqrt(np.diag(true).clip(min=0.0)), _scale(linear, kind, true)[1]
+    root[root < NONE * scale] = np.inf
+    counts = np.abs(true) > LEAST * np.outer(root, root)
+    error = np.divide(own, true, out=np.full_like(own, np.nan), where=counts) - 1.0
+    worst = np.unravel_index(np.nanargmax(np.abs(error)), error.shape)
+    if abs(error[worst]) > DOUBTFUL:
         warn(
-            f"{off} of {np.isfinite(error).sum()} entries of the stiffness differ by more than "
-            f"{DOUBTFUL:.0%} from superelements ({kind.entries[worst]} is {own[worst]:.4g}, theirs "
-            f"{other[worst]:.4g}: {error[worst]:+.0%}): {LINEAR}",
+            f"the stiffness of {' and '.join(kind.names[k] for k in worst)} is {own[worst]:.4g}, "
+            f"and {true[worst]:.4g} with superelements ({error[worst]:+.0%}): {LINEAR}",
             "effective.md#bars-and-hinges-beside-superelements",
             ModelRangeWarning,
         )
@@ -420,15 +403,6 @@ class Equivalent(NamedTuple):
     straight: int
     density: str
     coordinates: dict[str, Any]
-
-    @property
-    def entries(self) -> list[str]:
-        """Names of the upper triangle of the stiffness, row by row."""
-        load = self.coordinates["load"]
-        blocks = ["stiffness"] if len(load) == len(self.names) else list(BLOCKS)
-        ends = np.transpose(np.triu_indices(len(self.names))).tolist()
-        split = [(*divmod(i, len(load)), *divmod(j, len(load))) for i, j in ends]
-        return [f"{blocks[a + b]}[{load[i]},{load[j]}]" for a, i, b, j in split]
 
 
 KINDS = {

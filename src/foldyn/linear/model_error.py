@@ -36,12 +36,11 @@ from foldyn.structures import Structure
 from foldyn.structures.beyond_range import LINEAR
 from foldyn.values import flag
 
-LEVEL, DIVISIONS = 3, 12
+BESIDE: dict[str, Any] = {"level": 3, "divisions": 12}
 """The superelements to compare with."""
 PANELS, SHAPES = 200, 20
 """Most panels, and most different ones, that are compared: a comparison takes 2 to 4 s."""
-OF_STIFFNESS = 16, 8
-"""The same for the stiffness of cells, whose panels have the best mesh and more shapes."""
+OF_STIFFNESS = 16, 8  # the same for effective properties, which need finer superelements
 SPARE = 10  # additional modes of superelements among which partners are sought
 LEAST = 0.5  # least MAC of a partner
 SLOW = 1e-3  # frequencies of bands below this, relative to the highest, are not compared
@@ -73,13 +72,11 @@ ALONE = Beside()
 """Not compared."""
 
 
-def beside(
-    case: Case, asked: bool, state: Any, secant: float | None, *, stiffness: bool = False
-) -> Beside:
+def beside(case: Case, asked: bool, state: Any, secant: Any, stiffness: bool = False) -> Beside:
     """What a case is compared with, if asked for; at rest, and with the slopes of its laws only.
 
-    stiffness : whether effective properties are compared. On one mesh of `DIVISIONS` they are up to
-    16 % off, so that the superelements are the default ones.
+    stiffness : whether effective properties are compared. On one mesh of 12 divisions they
+    would be up to 16 % off, so that the superelements are the default ones.
     """
     structure = case.structure
     if not flag("check_model", asked) or state is not None or secant is not None:
@@ -99,8 +96,7 @@ def beside(
             return Beside(why=f"{shapes} different panels, more than {kinds}")
         with quietly():
             bare = case.altered(loads=(), contact=None)
-            own = {} if stiffness else {"level": LEVEL, "divisions": DIVISIONS}
-            return Beside(superelements_of(bare, **own))
+            return Beside(superelements_of(bare, **({} if stiffness else BESIDE)))
     except InputError as error:
         return Beside(why=str(error))
 
@@ -185,11 +181,8 @@ def judged(
 def warn_of(doubts: str) -> None:
     """Warn about modes or bands that are far off, alone, or missing; not if there is no doubt."""
     if doubts:
-        warn(
-            f"{doubts}: {LINEAR}",
-            "superelements.md#bars-and-hinges-beside-them",
-            ModelRangeWarning,
-        )
+        text = f"{doubts}: {LINEAR}"
+        warn(text, "superelements.md#bars-and-hinges-beside-them", ModelRangeWarning)
 
 
 def _far_off(name: str, errors: NDArray) -> str:
