@@ -13,8 +13,9 @@ from scipy.sparse.linalg import splu
 import foldyn as fd
 from foldyn.algebra import superlu
 from foldyn.errors import FoldynWarning, InputError
-from foldyn.linear.effective import _solved, compliance, effective
+from foldyn.linear.effective import _solved, effective
 from foldyn.linear.linearized_cell import linearize_cell
+from foldyn.linear.moduli import compliance
 from foldyn.patterns.screw import of_twist, translation
 from verification.benchmarks.sheets import ANGLE, A, B, miura_of, ratio, thin
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from typing import Any
 
 import numpy as np
 import pytest
@@ -98,8 +99,9 @@ def test_what_is_not_compared_says_so(monkeypatch):
         fd.effective(cell(model=fd.shell, divisions=1)),
     ):
         assert "model_error" not in found and "not_compared" not in found.attrs
+    wrong: Any = "no"
     with pytest.raises(InputError, match='check_model = "no"'):
-        fd.effective(cell(), check_model="no")
+        fd.effective(cell(), check_model=wrong)
 
 
 @pytest.mark.matrix

@@ -36,6 +36,7 @@ from scipy import sparse
 from foldyn.algebra.superlu import SingularTangentError, unsymmetric
 from foldyn.cases import State
 from foldyn.errors import InputError, ModelRangeWarning, quietly, warn
+from foldyn.linear import moduli
 from foldyn.linear.linearized import amplitude_of, slope_change
 from foldyn.linear.linearized_cell import LinearizedCell, linearize_cell
 from foldyn.linear.model_error import DOUBTFUL, LINEAR, beside
@@ -48,13 +49,8 @@ from foldyn.values import of_kind
 STRAINS = ("xx", "yy", "xy")
 BEAM = ("stretch", "twist", "bend_1", "bend_2")
 SOLID = ("xx", "yy", "zz", "yz", "xz", "xy")
-PAIRS = np.array([(0, 1), (0, 2), (1, 0), (1, 2), (2, 0), (2, 1)])  # of directions
-SOFT = 1e-12  # stiffness of a strain, relative to the stiffest, below which it counts as zero
-BOUNDLESS = 1e60  # stands for an infinite compliance, m/N or 1/(N m)
-NOISE = 1e-6  # shares of a strain below this are round-off
 SAME = 1e-9  # sine of a screw's angle below which it counts as zero
 STRAINED = 1e-6  # mean strains below this, by which a state would relax, are round-off
-ANGLES = np.linspace(0.0, 180.0, 181)  # degrees
 LEFT = 1e-6  # largest force that relaxing leaves, relative to the forces of the mean strains,
 ROUNDING = 1e-12  # and, of a unit strain, to the stiffest dof
 LEAST, NONE = 0.01, 3e-5  # smallest entries, and roots of stiffness, that are compared
@@ -277,14 +273,14 @@ def _warn_of(linear: LinearizedCell, kind: Equivalent, matrix: NDArray, loads: N
     names, (unit, scale) = kind.names, _scale(linear, kind, matrix)
     values, ways = np.linalg.eigh(matrix / np.outer(scale, scale))
     lowest = WaveSolver(linear.bloch, 1).waves(np.zeros(len(linear.motions))).values[0]
-    stable = bool(lowest >= 0.0 and values[0] >= -SOFT * values[-1])
+    stable = bool(lowest >= 0.0 and values[0] >= -moduli.SOFT * values[-1])
     if not stable:
         warn(
             "the state is unstable: the cell moves away from it by itself, and the stiffness is "
             "that of small motions about it; give a stable state",
             "effective.md#states",
         )
-    soft = np.abs(values) <= SOFT * values[-1]
+    soft = np.abs(values) <= moduli.SOFT * values[-1]
     if soft.any():
         share = np.abs(ways[:, soft]).max(axis=1)
         of = ", ".join(name for name, own in zip(names, share, strict=True) if own > 0.1)
@@ -332,61 +328,7 @@ def _errors(linear: LinearizedCell, kind: Equivalent, own: NDArray, true: NDArra
     return error
 
 
-# ---------------------------------------------------------------------- properties
-def plate_properties(matrix: NDArray, loads: NDArray) -> dict[str, Any]:
-    """Variables of a plate, from its stiffness (6, 6) and mean loads (6,)."""
-    membrane, coupling, bending = matrix[:3, :3], matrix[:3, 3:], matrix[3:, 3:]
-    square = ("load", "strain")
-    found: dict[str, Any] = {
-        "membrane": (square, membrane, {"units": "N/m"}),
-        "coupling": (square, coupling, {"units": "N"}),
-        "bending": (square, bending, {"units": "N m"}),
-        "mean_force": ("load", loads[:3], {"units": "N/m"}),
-        "mean_moment": ("load", loads[3:], {"units": "N"}),
-    }
-    free = bending - coupling.T @ np.linalg.pinv(membrane, SOFT, hermitian=True) @ coupling
-    for name, shear, unit, eased in (
-        ("", "shear_modulus", "N/m", compliance(membrane)),
-        ("bending_", "twisting_modulus", "N m", compliance(free)),
-    ):
-        found |= {
-            f"{name}modulus": ("direction", modulus(np.diag(eased)[:2]), {"units": unit}),
-            f"{name}poissons_ratio": (
-                "direction", -eased[[1, 0], [0, 1]] / np.diag(eased)[:2], {"units": "1"},
-            ),
-            shear: ((), modulus(eased[2, 2]), {"units": unit}),
-            f"{name}modulus_along": ("angle", modulus(along_directions(eased)), {"units": unit}),
-        }  # fmt: skip
-    return found
-
-
-def beam_properties(matrix: NDArray, loads: NDArray) -> dict[str, Any]:
-    """Variables of a beam, from its stiffness (4, 4) and mean loads (4,)."""
-    across = matrix[2:, 2:] - np.outer(matrix[2:, 0], matrix[0, 2:]) / matrix[0, 0]
-    return {
-        "stiffness": (("load", "strain"), matrix, {"units": "N, N m, N m2"}),
-        "mean_load": ("load", loads, {"units": "N, N m"}),
-        "axial_stiffness": ((), matrix[0, 0], {"units": "N"}),
-        "torsional_stiffness": ((), matrix[1, 1], {"units": "N m2"}),
-        "stretch_twist": ((), matrix[0, 1], {"units": "N m"}),
-        "bending_stiffness": ("bend", np.linalg.eigvalsh(across), {"units": "N m2"}),
-    }
-
-
-def solid_properties(matrix: NDArray, loads: NDArray) -> dict[str, Any]:
-    """Variables of a solid, from its stiffness (6, 6), Pa, and mean stress (6,)."""
-    eased = compliance(matrix)
-    own = np.diag(eased)
-    first, across = PAIRS.T
-    return {
-        "stiffness": (("load", "strain"), matrix, {"units": "Pa"}),
-        "mean_load": ("load", loads, {"units": "Pa"}),
-        "modulus": ("direction", modulus(own[:3]), {"units": "Pa"}),
-        "poissons_ratio": ("pair", -eased[across, first] / own[first], {"units": "1"}),
-        "shear_modulus": ("plane", modulus(own[3:]), {"units": "Pa"}),
-    }
-
-
+# ---------------------------------------------------------------------- kinds
 class Equivalent(NamedTuple):
     """An equivalent plate, beam or solid.
 
@@ -407,49 +349,26 @@ class Equivalent(NamedTuple):
 
 KINDS = {
     1: Equivalent(
-        _beam_frame, _beam, beam_properties, list(BEAM), 1, "kg/m",
+        _beam_frame, _beam, moduli.of_beam, list(BEAM), 1, "kg/m",
         {"load": list(BEAM), "bend": ["least", "greatest"]},
     ),
     2: Equivalent(
-        _plate_frame, _plate, plate_properties,
+        _plate_frame, _plate, moduli.of_plate,
         [f"{of} {name}" for of in ("strain", "curvature") for name in STRAINS], 3, "kg/m2",
         {
             "load": list(STRAINS), "direction": ["x", "y"],
-            "angle": ("angle", ANGLES, {"units": "degrees"}),
+            "angle": ("angle", moduli.ANGLES, {"units": "degrees"}),
         },
     ),
     3: Equivalent(
-        _solid_frame, _solid, solid_properties, [f"strain {name}" for name in SOLID], 6, "kg/m3",
+        _solid_frame, _solid, moduli.of_solid, [f"strain {name}" for name in SOLID], 6, "kg/m3",
         {
             "load": list(SOLID), "direction": ["x", "y", "z"], "plane": list(SOLID[3:]),
-            "pair": ["".join("xyz"[k] for k in pair) for pair in PAIRS],
+            "pair": ["".join("xyz"[k] for k in pair) for pair in moduli.PAIRS],
         },
     ),
 }  # fmt: skip
 """What is equivalent to a sheet, by the number of its periods."""
-
-
-def compliance(stiffness: NDArray) -> NDArray[np.float64]:
-    """Inverse (n, n), with `BOUNDLESS` for a strain that costs no energy; nan if several do not."""
-    values, ways = np.linalg.eigh(stiffness)
-    size = np.abs(values)
-    soft = size <= SOFT * size.max()
-    if soft.sum() > 1:
-        return np.full_like(stiffness, np.nan)
-    ways[:, soft] *= np.abs(ways[:, soft]) > NOISE
-    return (ways / np.where(soft, 1.0 / BOUNDLESS, values)) @ ways.T
-
-
-def modulus(eased: NDArray) -> NDArray[np.float64]:
-    """Moduli of compliances; 0 for boundless ones."""
-    return np.where(eased > NOISE**2 * BOUNDLESS, 0.0, 1.0 / eased)
-
-
-def along_directions(eased: NDArray) -> NDArray[np.float64]:
-    """Compliance along directions at `ANGLES` from x, from a compliance (3, 3)."""
-    c, s = np.cos(np.radians(ANGLES)), np.sin(np.radians(ANGLES))
-    load = np.array([c * c, s * s, c * s])
-    return np.einsum("ia,ij,ja->a", load, eased, load)
 
 
 class MeanStrains(NamedTuple):
