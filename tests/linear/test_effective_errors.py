@@ -52,6 +52,7 @@ def named(found) -> dict[str, float]:
     return out
 
 
+@pytest.mark.matrix
 def test_a_miura_sheet_with_soft_creases_is_right():
     found, true = fd.effective(cell()), numbers(fd.effective(cell(model=fd.superelements)))
     own, errors = numbers(found), named(found)
@@ -123,3 +124,19 @@ def test_a_strain_that_costs_nothing_has_no_error():
         found = fd.effective(strip)
     assert np.isnan(found.model_error.sel(row="bend_2", column="bend_2"))
     assert np.nanmax(np.abs(found.model_error)) < 0.01
+
+
+@pytest.mark.matrix
+def test_gradients_and_designs_are_not_compared(monkeypatch):
+    monkeypatch.setattr(model_error, "superelements_of", None)  # whose call would fail
+
+    def build(crease: float) -> fd.UnitCell:
+        return triangles(crease=crease)
+
+    what: dict[str, Any] = {"kind": "effective"}
+    found = fd.sensitivity(build, {"crease": SOFT}, measures=["modulus[x]"], analysis=what)
+    assert np.ravel(found.gradient_crease).item() > 0.0
+    space = {"crease": (SOFT, 1.1 * SOFT)}
+    own: dict[str, Any] = {"analysis": what, "method": "cma", "max_evaluations": 8}
+    least = fd.design(build, space, minimize="modulus[x]", **own)
+    assert SOFT <= least.parameters["crease"] < 1.1 * SOFT
