@@ -72,7 +72,7 @@ def test_a_sheet_of_triangles_bends_twice_too_stiffly_and_says_so():
     true, own = numbers(fd.effective(triangles(fd.superelements))), numbers(found)
     assert named(found)["bending[xx,xx]"] == pytest.approx(1.1, abs=0.02)
     wrong = re.search(
-        r"of curvature (..) and curvature (..) is (\S+), and (\S+) with .* \(\+(\d+)%\)", told
+        r"curvature (..), curvature (..)\) of .* is (\S+), and (\S+) with .* \(\+(\d+)%\)", told
     )
     assert wrong is not None
     name = f"bending[{','.join(sorted(wrong.groups()[:2], key=['xx', 'yy', 'xy'].index))}]"

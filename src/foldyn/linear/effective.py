@@ -320,8 +320,9 @@ def _errors(linear: LinearizedCell, kind: Equivalent, own: NDArray, true: NDArra
     worst = np.unravel_index(np.nanargmax(np.abs(error)), error.shape)
     if abs(error[worst]) > DOUBTFUL:
         warn(
-            f"the stiffness of {' and '.join(kind.names[k] for k in worst)} is {own[worst]:.4g}, "
-            f"and {true[worst]:.4g} with superelements ({error[worst]:+.0%}): {LINEAR}",
+            f"entry ({', '.join(kind.names[k] for k in worst)}) of the stiffness is "
+            f"{own[worst]:.4g}, and {true[worst]:.4g} with superelements ({error[worst]:+.0%}): "
+            f"{LINEAR}",
             "effective.md#bars-and-hinges-beside-superelements",
             ModelRangeWarning,
         )
