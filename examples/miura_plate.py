@@ -14,7 +14,7 @@ def plate(dihedral):
     """The plate that is equivalent to the sheet."""
     pattern = fd.patterns.miura(a=0.03, b=0.03, panel_angle=angle, dihedral=dihedral)
     structure = fd.discretize(pattern, sheet, crease_stiffness=1e-4, fold_law="linear")
-    return fd.effective(fd.UnitCell(fd.Case(structure)))
+    return fd.effective(fd.UnitCell(fd.Case(structure)), check_model=False)  # up to 7 % off
 
 
 plates = [plate(dihedral) for dihedral in dihedrals]

@@ -325,6 +325,7 @@ def solved(folder: Path) -> Calls:
         }),
         "effective": (fd.effective, {
             "cell": cell(), "state": fd.State(), "secant": 2.0, "load_factor": 1.0,
+            "check_model": True,
         }),
         "swept_sine": (fd.swept_sine, {
             "case": swung(), "measure": LIFT, "frequencies": [5.0, 6.0], "duration": 2.0,

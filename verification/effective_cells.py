@@ -63,7 +63,8 @@ class DrawnCell(NamedTuple):
         if model == "shell":
             own["vertex_radius"] = self.sheet.thickness
         structure = getattr(fd, model)(self.pattern, self.sheet, **own)
-        return fd.effective(fd.UnitCell(fd.Case(structure), vectors=self.vectors))
+        cell = fd.UnitCell(fd.Case(structure), vectors=self.vectors)
+        return fd.effective(cell, check_model=False)
 
     @property
     def told(self) -> bool:

@@ -19,7 +19,8 @@ def plate(dihedral):
     """The plate that is equivalent to the sheet."""
     pattern = fd.patterns.miura(a=0.03, b=0.03, panel_angle=angle, dihedral=dihedral)
     soft = {"crease_stiffness": 1e-4, "fold_law": "linear"}  # N/rad
-    return fd.effective(fd.UnitCell(fd.Case(fd.discretize(pattern, sheet, **soft))))
+    cell = fd.UnitCell(fd.Case(fd.discretize(pattern, sheet, **soft)))
+    return fd.effective(cell, check_model=False)  # at most 7 % from superelements
 
 
 plate(100)[["modulus", "poissons_ratio", "bending_modulus", "bending_poissons_ratio"]]

@@ -167,3 +167,18 @@ def test_states_that_are_unstable_are_hollow(tmp_path):
     _, hollow = fd.plots.plot_effective(found).axes[0].lines[:2]
     assert hollow.get_xdata().tolist() == [0.999]
     assert hollow.get_markerfacecolor() == "white"
+
+
+@pytest.mark.matrix
+@pytest.mark.usefixtures("compared")
+def test_models_are_compared_unless_the_file_says_no(tmp_path):
+    found = fd.read_case(written(tmp_path, SHEET)).run()
+    assert 0.0 < np.abs(found.model_error).max() < 0.05
+    page = fd.read_case(
+        written(tmp_path, SHEET + 'vary = { "pattern.dihedral" = [80, 100] }\n')
+    ).run()
+    assert page.model_error.sizes == {"state": 2, "row": 6, "column": 6}
+    none = fd.read_case(written(tmp_path, SHEET + "check_model = false\n")).run()
+    assert "model_error" not in none
+    with pytest.raises(InputError, match="check_model = 1: must be True or False"):
+        fd.read_case(written(tmp_path, SHEET + "check_model = 1\n")).run()

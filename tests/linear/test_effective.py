@@ -13,8 +13,9 @@ from scipy.sparse.linalg import splu
 import foldyn as fd
 from foldyn.algebra import superlu
 from foldyn.errors import FoldynWarning, InputError
-from foldyn.linear.effective import _solved, compliance, effective
+from foldyn.linear.effective import _solved, effective
 from foldyn.linear.linearized_cell import linearize_cell
+from foldyn.linear.moduli import compliance
 from foldyn.patterns.screw import of_twist, translation
 from verification.benchmarks.sheets import ANGLE, A, B, miura_of, ratio, thin
 
@@ -400,6 +401,12 @@ def test_what_is_no_free_material_is_refused():
     case = miura().case
     with pytest.raises(InputError, match="has supports or clamped edges"):
         effective(fd.UnitCell(fd.Case(case.structure, [fd.Fix([0], "z")])))
+    light = replace(SHEET, density=None)
+    for model in (fd.discretize, fd.superelements):
+        made = model(case.structure.pattern, SHEET if model is fd.superelements else light)
+        changed = replace(made, fold_stiffness=2.0 * made.fold_stiffness)
+        with pytest.raises(InputError, match="was changed after"):
+            effective(fd.UnitCell(fd.Case(changed)))
     stiff = fd.discretize(case.structure.pattern, SHEET, rigid=[0])
     with pytest.raises(InputError, match="has rigid panels"):
         effective(fd.UnitCell(fd.Case(stiff)))

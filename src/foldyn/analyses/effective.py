@@ -38,6 +38,8 @@ MEANING = (
 class EffectiveSection(CellSection):
     """[analysis] of kind "effective"."""
 
+    check_model: bool = True
+
 
 class EffectiveSchema(CellSchema):
     """A case file of kind "effective"."""
@@ -51,7 +53,7 @@ class EffectiveAnalysis(Analysis):
     kind = "effective"
     schema = EffectiveSchema
     needs_density = ""
-    takes = ("stretch", "turn", "secant")
+    takes = ("stretch", "turn", "secant", "check_model")
     files = ("effective",)
     by_mass = False
 
@@ -60,9 +62,7 @@ class EffectiveAnalysis(Analysis):
         states = cell_states(case_file, mass, {**self.arguments, **changes})
 
         def compute(progress: bool, begun: Begun) -> xarray.Dataset:
-            found = in_all(
-                states, lambda one: effective(one.cell, **one.arguments()), progress, begun
-            )
+            found = in_all(states, _effective, progress, begun)
             vary = states[0].varied
             return found[0] if vary is None else _joined(case_file.case(mass), vary, found)
 
@@ -92,6 +92,9 @@ class EffectiveAnalysis(Analysis):
                 lambda: plots.plot_effective(result),
             )  # fmt: skip
         yield Heading("The numbers")
+        if "model_error" in result:
+            error = 100.0 * float(np.abs(result["model_error"]).max())
+            yield Text(f"Entries of the stiffness are within {error:.2g} % of superelements'.")
         if several:
             yield _by_state(result)
             yield Text(MEANING)
@@ -111,12 +114,17 @@ class EffectiveAnalysis(Analysis):
         yield Text(MEANING)
 
 
+def _effective(state: Any) -> xarray.Dataset:
+    """Properties in one state."""
+    return effective(state.cell, check_model=state.given["check_model"], **state.arguments())
+
+
 def _joined(case: Case, vary: Varied, found: Sequence[xarray.Dataset]) -> xarray.Dataset:
     """Properties in all states as one result."""
     first, own = found[0], result_dataset("effective", case, {}, {}, {})
     values: dict[str, Any] = {}
     for name, one in first.data_vars.items():
-        if name not in own:
+        if name not in own and all(name in each for each in found):
             stacked = np.stack([each[name].values for each in found])
             values[str(name)] = ("state", *one.dims), stacked, one.attrs
     along: dict[str, Any] = {
@@ -124,6 +132,7 @@ def _joined(case: Case, vary: Varied, found: Sequence[xarray.Dataset]) -> xarray
     }
     facts = {
         "residual": max(one.attrs["residual"] for one in found),
+        "not_compared": first.attrs.get("not_compared"),
         "wall_seconds": sum(one.attrs["wall_seconds"] for one in found),
     }
     return result_dataset("effective", case, values, along | {"state": coordinate(vary)}, facts)

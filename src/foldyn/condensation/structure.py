@@ -112,17 +112,17 @@ class Superelements(Discretized):
 
     def at_level(self, level: int) -> Superelements:
         """The same with panels of another level."""
-        return replace(self, options=replace(self.options, level=level)).marked()
+        return self.altered(options=replace(self.options, level=level))
 
     @cached_property
     def for_stresses(self) -> Superelements:
         """The same with the shapes for stresses, or as many as the mesh can have."""
-        return replace(self, finer=FOR_STRESSES).marked()
+        return self.altered(finer=FOR_STRESSES)
 
     @cached_property
     def for_buckling(self) -> Superelements:
         """The same with the shapes for buckling."""
-        return replace(self, finer=FOR_BUCKLING).marked()
+        return self.altered(finer=FOR_BUCKLING)
 
     @cached_property
     def bars(self) -> NDArray:

@@ -89,7 +89,7 @@ class Measured:
             own: dict[str, Any] = UNCHECKED if "check_model" in file.analysis.arguments else {}
             return file.computation(**own).result(), file.case()
         case, arguments = self.build(**values), dict(self.analysis or {})
-        if arguments["kind"] in ("modes", "frf"):
+        if arguments["kind"] in ("modes", "frf", "effective"):
             arguments = {**UNCHECKED, **arguments}
         return FUNCTIONS[arguments.pop("kind")](case, **arguments), case
 

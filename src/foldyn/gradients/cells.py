@@ -21,7 +21,7 @@ class CellGradient(Differentiated):
     ----------
     cell : UnitCell or CaseFile
     arguments : mapping
-        Arguments of `fd.effective`; a file has its own.
+        Arguments of `fd.effective`; a file has its own. Models are not compared.
     """
 
     def __init__(self, cell: UnitCell | CaseFile, arguments: Mapping[str, Any]) -> None:
@@ -31,7 +31,7 @@ class CellGradient(Differentiated):
                 "turn, which finds the equilibrium of each cell",
                 "state",
             )
-        self._arguments = arguments
+        self._arguments = {**arguments, "check_model": False}
         self.result = self._computed(cell)
 
     def numbers(self, case: Any) -> Arrays:
@@ -45,5 +45,5 @@ class CellGradient(Differentiated):
 
     def _computed(self, cell: UnitCell | CaseFile) -> xarray.Dataset:
         if isinstance(cell, CaseFile):
-            return cell.computation().result()
+            return cell.computation(check_model=False).result()
         return effective(cell, **self._arguments)

@@ -35,9 +35,11 @@ from scipy import sparse
 
 from foldyn.algebra.superlu import SingularTangentError, unsymmetric
 from foldyn.cases import State
-from foldyn.errors import InputError, warn
+from foldyn.errors import InputError, ModelRangeWarning, quietly, warn
+from foldyn.linear import moduli
 from foldyn.linear.linearized import amplitude_of, slope_change
 from foldyn.linear.linearized_cell import LinearizedCell, linearize_cell
+from foldyn.linear.model_error import DOUBTFUL, LINEAR, beside
 from foldyn.linear.unit_cell import UnitCell
 from foldyn.linear.wave_solver import WaveSolver
 from foldyn.results.dataset import result_dataset
@@ -47,15 +49,11 @@ from foldyn.values import of_kind
 STRAINS = ("xx", "yy", "xy")
 BEAM = ("stretch", "twist", "bend_1", "bend_2")
 SOLID = ("xx", "yy", "zz", "yz", "xz", "xy")
-PAIRS = np.array([(0, 1), (0, 2), (1, 0), (1, 2), (2, 0), (2, 1)])  # of directions
-SOFT = 1e-12  # stiffness of a strain, relative to the stiffest, below which it counts as zero
-BOUNDLESS = 1e60  # stands for an infinite compliance, m/N or 1/(N m)
-NOISE = 1e-6  # shares of a strain below this are round-off
 SAME = 1e-9  # sine of a screw's angle below which it counts as zero
 STRAINED = 1e-6  # mean strains below this, by which a state would relax, are round-off
-ANGLES = np.linspace(0.0, 180.0, 181)  # degrees
 LEFT = 1e-6  # largest force that relaxing leaves, relative to the forces of the mean strains,
 ROUNDING = 1e-12  # and, of a unit strain, to the stiffest dof
+LEAST, NONE = 0.01, 3e-5  # smallest entries, and roots of stiffness, that are compared
 
 
 def effective(
@@ -64,6 +62,7 @@ def effective(
     *,
     secant: float | None = None,
     load_factor: float = 1.0,
+    check_model: bool = True,
 ) -> xarray.Dataset:
     """Stiffness of the plate, beam or solid that is equivalent to a repeated sheet.
 
@@ -80,6 +79,9 @@ def effective(
         Equilibrium of the repeated sheet, as `fd.linear.relaxed` finds it; by default rest.
     secant, load_factor : float
         As in `bands`.
+    check_model : bool
+        Whether to compare bars and hinges at rest with superelements, where that takes a few
+        seconds at most once the panels are condensed.
 
     Returns
     -------
@@ -102,7 +104,10 @@ def effective(
         counted twice, along the axes of space; `modulus` (direction) and `shear_modulus` (plane),
         Pa; `poissons_ratio` (pair): of "xy", minus the strain along y divided by that along x,
         under a stress along x; `density` (kg/m3). Of all `mean_load`, forces, moments or stresses
-        in the state, whether that is `stable`, and its variables as in `bands`.
+        in the state, whether that is `stable`, and its variables as in `bands`. Of bars and hinges
+        at rest `model_error` (row, column): relative errors of the stiffness C, of a sheet
+        [[A, B], [B', D]] with strains and curvatures as rows, by comparison with superelements; nan
+        for entries C_ij of less than 1 % of sqrt(C_ii C_jj).
 
     Raises
     ------
@@ -115,6 +120,8 @@ def effective(
     FoldynWarning
         The state is unstable, is no equilibrium, or has mean forces; a mean strain costs no energy,
         so that moduli are 0 and Poisson's ratios its own, or nan if there are two.
+    ModelRangeWarning
+        Entries of the stiffness of bars and hinges are more than 5 % off.
 
     Examples
     --------
@@ -133,7 +140,8 @@ def effective(
         raise InputError(": has supports or clamped edges, and a free material has none", "cell")
     weighed = structure.sheet.density is not None
     if not weighed:
-        case = replace(case, structure=replace(structure, sheet=structure.sheet.weighed).marked())
+        case = replace(case, structure=structure.altered(sheet=structure.sheet.weighed))
+    compared = beside(case, check_model, state, secant, stiffness=True)
     linear = linearize_cell(cell.with_case(case), state, secant, load_factor)
     if not linear.bloch.ties.empty:
         raise InputError(
@@ -148,12 +156,20 @@ def effective(
     matrix = whole / size
     stable = _warn_of(linear, kind, matrix, loads / size)
     found = kind.properties(matrix, loads / size) | {"stable": ((), stable, {})}
+    along = kind.coordinates | {"strain": kind.coordinates["load"]}
+    if compared.case is not None:
+        with quietly():
+            other = linearize_cell(cell.with_case(for_stresses(compared.case)), None, None, 1.0)
+            true = kind.stiffness(other, CellEnergy(other, None), frame)[0] / size
+        error = _errors(linear, kind, matrix, true)
+        found["model_error"] = ("row", "column"), error, {"units": "1"}
+        along |= {"row": kind.names, "column": kind.names}
     if weighed:
         found["density"] = (), energy.mass.sum() / size, {"units": kind.density}
     found["center"] = "axis", energy.center, {"units": "m"}
     found["frame"] = ("own_axis", "axis"), frame, {"units": "1"}
-    along = kind.coordinates | {"strain": kind.coordinates["load"]}
-    facts = {"residual": linear.residual, "wall_seconds": time.perf_counter() - began}
+    facts = {"residual": linear.residual, "not_compared": compared.why}
+    facts["wall_seconds"] = time.perf_counter() - began
     return result_dataset("effective", cell.case, found | linear.variables, along, facts)
 
 
@@ -254,21 +270,17 @@ def _solid(linear: LinearizedCell, energy: CellEnergy, frame: NDArray) -> tuple[
 
 def _warn_of(linear: LinearizedCell, kind: Equivalent, matrix: NDArray, loads: NDArray) -> bool:
     """Whether the state is stable; warn if not, of strains without stiffness, of mean forces."""
-    names, straight, size = kind.names, kind.straight, linear.cell.case.structure.pattern.size
-    unit = np.where(np.arange(len(names)) < straight, 1.0, size)  # of curvatures, and twists
-    stiff = np.abs(np.diag(matrix)) / unit**2
-    stiffest = stiff.reshape(2, 3).max(axis=1).repeat(3) if kind.straight == 3 else stiff.max()
-    scale = unit * np.sqrt(stiffest)
+    names, (unit, scale) = kind.names, _scale(linear, kind, matrix)
     values, ways = np.linalg.eigh(matrix / np.outer(scale, scale))
     lowest = WaveSolver(linear.bloch, 1).waves(np.zeros(len(linear.motions))).values[0]
-    stable = bool(lowest >= 0.0 and values[0] >= -SOFT * values[-1])
+    stable = bool(lowest >= 0.0 and values[0] >= -moduli.SOFT * values[-1])
     if not stable:
         warn(
             "the state is unstable: the cell moves away from it by itself, and the stiffness is "
             "that of small motions about it; give a stable state",
             "effective.md#states",
         )
-    soft = np.abs(values) <= SOFT * values[-1]
+    soft = np.abs(values) <= moduli.SOFT * values[-1]
     if soft.any():
         share = np.abs(ways[:, soft]).max(axis=1)
         of = ", ".join(name for name, own in zip(names, share, strict=True) if own > 0.1)
@@ -290,61 +302,34 @@ def _warn_of(linear: LinearizedCell, kind: Equivalent, matrix: NDArray, loads: N
     return stable
 
 
-# ---------------------------------------------------------------------- properties
-def plate_properties(matrix: NDArray, loads: NDArray) -> dict[str, Any]:
-    """Variables of a plate, from its stiffness (6, 6) and mean loads (6,)."""
-    membrane, coupling, bending = matrix[:3, :3], matrix[:3, 3:], matrix[3:, 3:]
-    square = ("load", "strain")
-    found: dict[str, Any] = {
-        "membrane": (square, membrane, {"units": "N/m"}),
-        "coupling": (square, coupling, {"units": "N"}),
-        "bending": (square, bending, {"units": "N m"}),
-        "mean_force": ("load", loads[:3], {"units": "N/m"}),
-        "mean_moment": ("load", loads[3:], {"units": "N"}),
-    }
-    free = bending - coupling.T @ np.linalg.pinv(membrane, SOFT, hermitian=True) @ coupling
-    for name, shear, unit, eased in (
-        ("", "shear_modulus", "N/m", compliance(membrane)),
-        ("bending_", "twisting_modulus", "N m", compliance(free)),
-    ):
-        found |= {
-            f"{name}modulus": ("direction", modulus(np.diag(eased)[:2]), {"units": unit}),
-            f"{name}poissons_ratio": (
-                "direction", -eased[[1, 0], [0, 1]] / np.diag(eased)[:2], {"units": "1"},
-            ),
-            shear: ((), modulus(eased[2, 2]), {"units": unit}),
-            f"{name}modulus_along": ("angle", modulus(along_directions(eased)), {"units": unit}),
-        }  # fmt: skip
-    return found
+def _scale(linear: LinearizedCell, kind: Equivalent, matrix: NDArray) -> tuple[NDArray, NDArray]:
+    """Units (n,) of strains, and with them roots of the stiffness of the stiffest (n,)."""
+    size = linear.cell.case.structure.pattern.size
+    unit = np.where(np.arange(len(kind.names)) < kind.straight, 1.0, size)  # curvatures, twists
+    stiff = np.abs(np.diag(matrix)) / unit**2
+    stiffest = stiff.reshape(2, 3).max(axis=1).repeat(3) if kind.straight == 3 else stiff.max()
+    return unit, unit * np.sqrt(stiffest)
 
 
-def beam_properties(matrix: NDArray, loads: NDArray) -> dict[str, Any]:
-    """Variables of a beam, from its stiffness (4, 4) and mean loads (4,)."""
-    across = matrix[2:, 2:] - np.outer(matrix[2:, 0], matrix[0, 2:]) / matrix[0, 0]
-    return {
-        "stiffness": (("load", "strain"), matrix, {"units": "N, N m, N m2"}),
-        "mean_load": ("load", loads, {"units": "N, N m"}),
-        "axial_stiffness": ((), matrix[0, 0], {"units": "N"}),
-        "torsional_stiffness": ((), matrix[1, 1], {"units": "N m2"}),
-        "stretch_twist": ((), matrix[0, 1], {"units": "N m"}),
-        "bending_stiffness": ("bend", np.linalg.eigvalsh(across), {"units": "N m2"}),
-    }
+def _errors(linear: LinearizedCell, kind: Equivalent, own: NDArray, true: NDArray) -> NDArray:
+    """Relative errors (n, n) of a stiffness, beside that of superelements; warns of large ones."""
+    root, scale = np.sqrt(np.diag(true).clip(min=0.0)), _scale(linear, kind, true)[1]
+    root[root < NONE * scale] = np.inf
+    counts = np.abs(true) > LEAST * np.outer(root, root)
+    error = np.divide(own, true, out=np.full_like(own, np.nan), where=counts) - 1.0
+    worst = np.unravel_index(np.nanargmax(np.abs(error)), error.shape)
+    if abs(error[worst]) > DOUBTFUL:
+        warn(
+            f"entry ({', '.join(kind.names[k] for k in worst)}) of the stiffness is "
+            f"{own[worst]:.4g}, and {true[worst]:.4g} with superelements ({error[worst]:+.0%}): "
+            f"{LINEAR}",
+            "effective.md#bars-and-hinges-beside-superelements",
+            ModelRangeWarning,
+        )
+    return error
 
 
-def solid_properties(matrix: NDArray, loads: NDArray) -> dict[str, Any]:
-    """Variables of a solid, from its stiffness (6, 6), Pa, and mean stress (6,)."""
-    eased = compliance(matrix)
-    own = np.diag(eased)
-    first, across = PAIRS.T
-    return {
-        "stiffness": (("load", "strain"), matrix, {"units": "Pa"}),
-        "mean_load": ("load", loads, {"units": "Pa"}),
-        "modulus": ("direction", modulus(own[:3]), {"units": "Pa"}),
-        "poissons_ratio": ("pair", -eased[across, first] / own[first], {"units": "1"}),
-        "shear_modulus": ("plane", modulus(own[3:]), {"units": "Pa"}),
-    }
-
-
+# ---------------------------------------------------------------------- kinds
 class Equivalent(NamedTuple):
     """An equivalent plate, beam or solid.
 
@@ -365,49 +350,26 @@ class Equivalent(NamedTuple):
 
 KINDS = {
     1: Equivalent(
-        _beam_frame, _beam, beam_properties, list(BEAM), 1, "kg/m",
+        _beam_frame, _beam, moduli.of_beam, list(BEAM), 1, "kg/m",
         {"load": list(BEAM), "bend": ["least", "greatest"]},
     ),
     2: Equivalent(
-        _plate_frame, _plate, plate_properties,
+        _plate_frame, _plate, moduli.of_plate,
         [f"{of} {name}" for of in ("strain", "curvature") for name in STRAINS], 3, "kg/m2",
         {
             "load": list(STRAINS), "direction": ["x", "y"],
-            "angle": ("angle", ANGLES, {"units": "degrees"}),
+            "angle": ("angle", moduli.ANGLES, {"units": "degrees"}),
         },
     ),
     3: Equivalent(
-        _solid_frame, _solid, solid_properties, [f"strain {name}" for name in SOLID], 6, "kg/m3",
+        _solid_frame, _solid, moduli.of_solid, [f"strain {name}" for name in SOLID], 6, "kg/m3",
         {
             "load": list(SOLID), "direction": ["x", "y", "z"], "plane": list(SOLID[3:]),
-            "pair": ["".join("xyz"[k] for k in pair) for pair in PAIRS],
+            "pair": ["".join("xyz"[k] for k in pair) for pair in moduli.PAIRS],
         },
     ),
 }  # fmt: skip
 """What is equivalent to a sheet, by the number of its periods."""
-
-
-def compliance(stiffness: NDArray) -> NDArray[np.float64]:
-    """Inverse (n, n), with `BOUNDLESS` for a strain that costs no energy; nan if several do not."""
-    values, ways = np.linalg.eigh(stiffness)
-    size = np.abs(values)
-    soft = size <= SOFT * size.max()
-    if soft.sum() > 1:
-        return np.full_like(stiffness, np.nan)
-    ways[:, soft] *= np.abs(ways[:, soft]) > NOISE
-    return (ways / np.where(soft, 1.0 / BOUNDLESS, values)) @ ways.T
-
-
-def modulus(eased: NDArray) -> NDArray[np.float64]:
-    """Moduli of compliances; 0 for boundless ones."""
-    return np.where(eased > NOISE**2 * BOUNDLESS, 0.0, 1.0 / eased)
-
-
-def along_directions(eased: NDArray) -> NDArray[np.float64]:
-    """Compliance along directions at `ANGLES` from x, from a compliance (3, 3)."""
-    c, s = np.cos(np.radians(ANGLES)), np.sin(np.radians(ANGLES))
-    load = np.array([c * c, s * s, c * s])
-    return np.einsum("ia,ij,ja->a", load, eased, load)
 
 
 class MeanStrains(NamedTuple):

@@ -270,7 +270,7 @@ REASONS: Mapping[str, str] = {
     "damped_ratio": "a rigid motion does not oscillate",
     "slope": "bands have corners where the frequency is zero",
     "group_velocity": "bands have corners where the frequency is zero",
-    "model_error": "rigid modes, and modes that superelements lack, are not compared",
+    "model_error": "rigid modes, what superelements lack, and entries near 0 are not compared",
     "damping_ratio": "a rigid or an unstable mode does not oscillate",
     "receptance": "a resonance without damping, a body free to move at 0 Hz, or no convergence",
     "transmissibility": "a resonance without damping, or no convergence",

@@ -193,6 +193,11 @@ class Discretized:
         object.__setattr__(self, "as_made", True)
         return self
 
+    def altered(self, **changes: Any) -> Self:
+        """The structure with changes after which it can be rebuilt, if it can."""
+        other = replace(self, **changes)
+        return other.marked() if self.as_made else other
+
     @cached_property
     def fold_law(self) -> HingeLaw:
         """Law of the folds."""
@@ -280,8 +285,7 @@ class Discretized:
             'bars and hinges of scheme = "n5b8"',
             "method",
         )
-        other = replace(self, by_folds=True)
-        return other.marked() if self.as_made else other
+        return self.altered(by_folds=True)
 
     def held(self, edges: Mapping[int, NDArray]) -> Assembly:
         """Model for solvers if supports hold edges along their whole length.
