@@ -68,7 +68,7 @@ class Motion:
         packed: PackedCase, sampler: Sampler, reason: str = "",
         better: Callable[[], Motion] | None = None, device: str = "cpu",
     ) -> None:  # fmt: skip
-        self.device = device
+        self.device, self.kind = device, method.name
         self.case, self.method, self.plan = case, method, plan
         self.critical, self.force, self.reason = critical, force, reason
         self._initial, self.origin, self.packed, self._sampler = state, origin, packed, sampler
