@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import platform
+import re
 import sys
+import tomllib
 from importlib import metadata
+from pathlib import Path
 
 import pytest
 
@@ -15,6 +18,14 @@ from foldyn.linear import METHODS as RESPONSES
 from foldyn.structures import MASS_RULES
 from foldyn.studies import shipped_cases
 
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def dependencies() -> set[str]:
+    """Names of the packages that Foldyn needs, as the project states them."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
+    return {re.findall(r"^[\w-]+", one)[0] for one in project["dependencies"]}
+
 
 def test_info(workplace) -> None:
     told = workplace.call("info")
@@ -22,8 +33,8 @@ def test_info(workplace) -> None:
     lines = told.out.splitlines()
     assert lines[0] == f"foldyn {fd.__version__}"
     assert any(line.startswith(f"python {platform.python_version()}") for line in lines)
-    for name in ("numpy", "numba", "xarray"):
-        assert f"{name} {metadata.version(name)}" in lines
+    assert {"numpy", "h5py", "tomli-w", "threadpoolctl", "rslab"} <= (needed := dependencies())
+    assert all(f"{name} {metadata.version(name)}" in lines for name in needed)
     (here,) = (line.split() for line in lines if line.startswith("processors: "))
     assert int(here[-1]) == min(8, int(here[1].rstrip(";")))  # no more than there are
     assert any(line.startswith("kernels of rk4: ") for line in lines)

@@ -557,3 +557,17 @@ def test_long_panels_are_warned_of():
     off = np.abs(long.frequency.values - short.frequency.values)[:2]
     assert ((long.frequency_error + short.frequency_error).values[:2] > off).all()
     assert (short.frequency_error < 0.01 * short.frequency).all()
+
+
+@pytest.mark.parametrize(("divisions", "count"), [(4, 100), (None, 156)])
+def test_all_modes_of_one_panel(divisions, count):
+    """The lowest of all modes, of full matrices, are those that Lanczos finds alone."""
+    corners = np.array([[0.0, 0, 0], [0.1, 0, 0], [0.1, 0.1, 0], [0, 0.1, 0]])
+    panel, sheet = fd.Pattern(corners, [[0, 1, 2, 3]]), fd.Sheet(2e9, 0.3, 1e-3, 1000.0)
+    case = fd.Case(fd.superelements(panel, sheet, divisions=divisions), [fd.Fix("xmin")])
+    few, every = fd.modes(case, 8), fd.modes(case, count)
+    np.testing.assert_allclose(every.frequency[:8], few.frequency, rtol=1e-9)
+    np.testing.assert_allclose(every.frequency_error[:8], few.frequency_error, rtol=0.1)
+    if divisions == 4:  # shapes outnumber the inner nodes of so coarse a mesh
+        with pytest.raises(InputError, match=r"count = 156: the case has only 1\d\d modes, as"):
+            fd.modes(case, 156)

@@ -16,10 +16,11 @@ from on_gpu import CASE_FILE
 
 import foldyn as fd
 from foldyn.cli.main import main
-from foldyn.dynamics.driver import prepare
+from foldyn.dynamics.driver import prepare, prepared
 from foldyn.dynamics.gpu import checks, choice
 from foldyn.errors import InputError
 from foldyn.mechanics.springs import SpringsTerm
+from foldyn.sweeps.run_sweep import AT_ONCE, SideBySide
 from named_models import named
 
 PATTERN = fd.patterns.miura((1, 1), panel_angle=60.0, dihedral=110.0)
@@ -156,6 +157,18 @@ def test_few_or_short_motions_stay_on_the_cpu(monkeypatch):
         assert device == "cpu" and why in reason
     monkeypatch.setattr(choice, "LARGEST", 30)
     assert choice.choose([motion], 1000, 2)[1].startswith("models of more than 30 dofs")
+
+
+def test_superposed_modes_and_releases_stay_on_the_cpu():
+    panel = fd.Pattern(np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]]), [[0, 1, 2]])
+    cases = {
+        "modal": fd.Case(fd.superelements(panel, SHEET, divisions=4)),
+        "a motion with releases": sheet(**LUMPED).altered(supports=[fd.Fix("xmin", until=0.5)]),
+    }
+    for name, case in cases.items():
+        motion = prepared(case, 1.0, interval=0.1)
+        assert choice.choose([motion], 1000, 2) == ("cpu", f"{name} has no GPU kernel")
+        assert SideBySide(None, motion).count == AT_ONCE
 
 
 def test_a_method_without_kernels_is_named():

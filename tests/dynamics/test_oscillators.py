@@ -47,6 +47,23 @@ def test_order_on_linear_and_duffing_oscillators(method, cubic):
     assert errors[-1] < 10.0 ** (1 - 2 * METHODS[method].order) * a
 
 
+@pytest.mark.parametrize("masses", [1, 3])
+@pytest.mark.parametrize("method", METHODS)
+def test_masses_on_springs_without_any_bar(method, masses):
+    """m x'' + k x = F, from rest: x = (F / k) (1 - cos(w t)), wherever a mass stands."""
+    structure = fd.Structure(
+        np.arange(masses)[:, None] * [[2.0, 0.0, 0.0]], np.zeros((0, 2), int), np.zeros(0),
+        fd.Sheet(1e9, 0.3, 0.01), node_mass=np.full(masses, 0.5),
+    )  # fmt: skip
+    nodes = list(range(masses))
+    load = fd.Force(nodes, (0.0, 0.0, 0.1))
+    case = fd.Case(structure, [fd.Spring(K, nodes=nodes)], [load])
+    motion = fd.simulate(case, 1.0, method=method, dt=2e-3)
+    exact = 0.1 / K * (1.0 - np.cos(OMEGA * motion.time.values))
+    moved = motion.displacement.values[:, :, 2].T
+    np.testing.assert_allclose(moved, np.tile(exact, (masses, 1)), atol=2e-5 * 0.1 / K)
+
+
 @pytest.mark.matrix
 def test_rk4_loses_energy_with_the_fifth_power_of_the_step():
     """|R(i w h)|^2 = 1 - (w h)^6 / 72 + ...: over a fixed time the loss is T w (w h)^5 / 72."""

@@ -52,6 +52,29 @@ def test_gradients_by_the_shape_of_panels(preset):
     assert max(design.errors().values()) < 1e-6
 
 
+@pytest.mark.parametrize("preset", [None, "plate"])
+def test_translations_on_springs_turn_nothing(preset):
+    """A mass, and a rigid plate of one panel: f = sqrt(n k / m) / (2 pi), on n springs."""
+
+    def build(k: float) -> fd.Case:
+        corners = np.array([[0.0, 0, 0], [1, 0, 0], [1, 2, 0], [0, 2, 0]])
+        sheet = fd.Sheet(1e9, 0.3, 0.01, 900)
+        if preset is None:
+            none = np.zeros((0, 2), int), np.zeros(0)
+            made = fd.Structure(corners[:1], *none, sheet, node_mass=np.array([18.0]))
+        else:
+            pattern = fd.Pattern(corners, [[0, 1, 2, 3]])
+            made = fd.discretize(pattern, sheet, preset=preset, rigid="all")
+        nodes = list(range(len(made.nodes)))
+        return fd.Case(made, [fd.Fix(nodes, "xy"), fd.Spring(k, nodes=nodes, direction="z")])
+
+    modes = {"kind": "modes", "count": 1}
+    found = fd.sensitivity(build, {"k": 3.0}, measures="frequency[1]", analysis=modes)
+    exact = np.sqrt(3.0 * len(build(3.0).structure.nodes) / 18.0) / (2.0 * np.pi)
+    np.testing.assert_allclose(found.value, exact, rtol=1e-10)
+    np.testing.assert_allclose(found.gradient_k, exact / 6.0, rtol=1e-10)
+
+
 @pytest.mark.matrix
 def test_how_near_panels_are_at_rest():
     def folded(dihedral: float, panel_angle: float) -> fd.Case:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from typing import Any
 
 import numpy as np
@@ -230,6 +231,18 @@ def test_a_kink_of_the_design_is_warned_of(preset):
     fd.sensitivity(
         build, {"shift": 0.01}, measures="mass", analysis=MODES
     )  # beside it there is none
+
+
+@pytest.mark.parametrize("thickness", [0.016, 0.018, 0.02, 0.021])
+def test_rounding_of_what_is_always_zero_is_no_kink(thickness):
+    def rounding(result, case: fd.Case) -> float:
+        return (float(case.structure.sheet.thickness) + 0.1) - 0.1 - case.structure.sheet.thickness
+
+    own = {"zero": (rounding, lambda result, case: {})}
+    with warnings.catch_warnings():
+        warnings.filterwarnings("error", ".* have a kink here", FoldynWarning)
+        found = fd.sensitivity(cell, {"thickness": thickness}, measures=own, analysis=MODES)
+    assert abs(float(found.gradient_thickness[0])) < 1e-7
 
 
 @pytest.mark.parametrize("size", [0.0, -0.01, 1e-12])

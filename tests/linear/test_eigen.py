@@ -60,7 +60,13 @@ def test_few_dofs_are_solved_in_full(monkeypatch):
     pencil = Pencil(stiffness, mass)
     found = eigen.lowest(pencil, N, NOTHING)
     np.testing.assert_allclose(found.values, values, rtol=1e-10)
-    assert pencil.factorizations == 0 and np.isnan(found.shift)
+    assert pencil.factorizations == 1 and np.isnan(found.shift)
+
+
+def test_what_nothing_resists_has_the_eigenvalue_zero():
+    stiffness, mass, _ = chain()
+    found = eigen.lowest(Pencil(0.0 * stiffness, mass), N, NOTHING)
+    np.testing.assert_array_equal(found.values, np.zeros(N))
 
 
 def test_a_known_mode_is_taken_out_and_put_back():

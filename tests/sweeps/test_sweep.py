@@ -10,9 +10,10 @@ import pytest
 from swept_cases import FRF, MODES, PATH, compiled_here, fails_sometimes
 
 import foldyn as fd
-from case_texts import changed
+from case_texts import HELD_MIURA_TEXT, changed
 from foldyn.analyses.keys import replaced
 from foldyn.analyses.reading import case_of_document, read_document
+from foldyn.dynamics.gpu import choice
 from foldyn.errors import ComputationError, InputError
 from foldyn.sweeps import Measure, evaluations, job
 from foldyn.sweeps.evaluations import Evaluation
@@ -375,3 +376,25 @@ def test_what_a_path_had_before_it_stopped_is_measured(tmp_path):
     told = str(found["failure"].values)
     assert "what there is of the path is measured" in told
     assert "displacement[5,z]: needs a whole path" in told
+
+
+PUSHED = f"""{HELD_MIURA_TEXT}[[loads]]
+nodes = [8]
+force = [0, 0, 1e-4]
+[analysis]
+kind = "dynamics"
+duration = 0.2
+[output]
+interval = 0.02
+"""
+
+
+@pytest.mark.matrix
+def test_motions_of_superelements_stay_on_the_cpu(case, monkeypatch):
+    monkeypatch.setattr(choice, "FEWEST", 2)
+    case.write_text(PUSHED + '[model]\nkind = "superelements"\n')
+    found = of(case, ["largest_displacement"], {"sheet.density": [1.0, 4.0]})
+    assert found.attrs["device"] == "cpu"
+    assert found.attrs["device_reason"] == "modal has no GPU kernel"
+    alone = fd.read_case(case).run()["displacement"]
+    assert float(found["largest_displacement"][0]) == np.linalg.norm(alone, axis=-1).max()

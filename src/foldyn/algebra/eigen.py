@@ -9,21 +9,22 @@ miss modes of multiple eigenvalues; missed modes are searched for again, orthogo
 A factorization of K - s M has as many negative eigenvalues as the problem has eigenvalues below s
 (Sylvester's law of inertia). Two counts, below and above a set of computed modes, prove that none
 between them was missed. M is positive definite, except for massless dofs that follow the others
-(edge rotations of shells). These have no modes and, as K is positive definite on them, do not
-count.
+(edge rotations of shells) and motions of superelements on coarse meshes. These have no modes and,
+as K is positive definite on them, do not count.
 
 Modes known beforehand (rigid motions) are excluded from the search, so that they remain exact.
 """
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import sparse
 from scipy.linalg import eigh
-from scipy.sparse.linalg import ArpackNoConvergence, LinearOperator, eigsh
+from scipy.sparse.linalg import ArpackError, ArpackNoConvergence, LinearOperator, eigsh
 
 from foldyn.algebra.solvers import factorizer
 from foldyn.algebra.superlu import Factorization, SingularTangentError
@@ -43,6 +44,7 @@ EPS = float(np.finfo(float).eps)
 ROUNDING = 5.0 * EPS  # rounding error of an eigenvalue at zero, relative to |phi|' |K| |phi|
 NUDGES = 4  # largest number of small moves of a shift that hits an eigenvalue
 NUDGE = 1e-7
+WEIGHTLESS = 1e-12  # 1 / lambda of motions that carry no mass, relative to the largest one
 
 
 class Pencil:
@@ -61,9 +63,9 @@ class Pencil:
 
     @property
     def scale(self) -> float:
-        """Ratio of the mean diagonals of K and M, rad2/s2, which is large compared to low modes."""
+        """Ratio of the mean diagonals of K and M, rad2/s2, large beside low modes; 1 without K."""
         stiffness = np.abs(self.stiffness.diagonal())[self.heavy]
-        return float(stiffness.sum() / self.mass.diagonal().sum())
+        return float(stiffness.sum() / self.mass.diagonal().sum()) or 1.0
 
     def factorize(self, shift: float) -> Factorization:
         """Factors of K - s M; s is moved slightly if this matrix is singular."""
@@ -121,7 +123,7 @@ class Spectrum:
 
 
 def lowest(pencil: Pencil, count: int, known: NDArray, verify: bool = True) -> Spectrum:
-    """The `count` lowest modes of a pencil.
+    """The `count` lowest modes of a pencil; fewer if other motions carry no mass.
 
     Parameters
     ----------
@@ -146,22 +148,28 @@ def lowest(pencil: Pencil, count: int, known: NDArray, verify: bool = True) -> S
     if not np.isfinite(pencil.stiffness.data).all():
         raise ComputationError("modes: the tangent in this state is not finite")
     basis = max(2 * (count + GUARD) + 1, LEAST_BASIS)
-    if pencil.size <= DENSE or basis >= pencil.finite - known.shape[1]:
+    try:
+        if pencil.size > DENSE and basis < pencil.finite - known.shape[1]:
+            with suppress(ArpackError):  # fewer motions than Lanczos vectors carry mass
+                return _sparse(pencil, count, known, verify)
         if pencil.size > MOST_DENSE:
             raise InputError(
                 f" = {count}: ask for fewer than half of the modes of {pencil.size} free dofs",
                 "count",
             )
         values, shapes = _sorted(pencil, *_all(pencil, known), known)
-        return Spectrum(values[:count], shapes[:, :count], float("nan"), count, 0)
-    try:
-        return _sparse(pencil, count, known, verify)
     except SingularTangentError as error:
         raise ComputationError(f"modes: {error}") from error
+    values, shapes = values[:count], shapes[:, :count]
+    return Spectrum(values, shapes, float("nan"), len(values), 0)
 
 
 def _all(pencil: Pencil, known: NDArray) -> tuple[NDArray, NDArray]:
-    """All modes except the known ones, which are shifted above all others."""
+    """All modes except the known ones.
+
+    Where some motions hardly carry any mass, as those of superelements, the largest 1 / lambda are
+    accurate, and the smallest lambda would not be.
+    """
     heavy, light = np.flatnonzero(pencil.heavy), np.flatnonzero(~pencil.heavy)
     mass = pencil.mass.toarray()[np.ix_(heavy, heavy)]
     stiffness = pencil.stiffness[heavy][:, heavy].toarray()
@@ -170,15 +178,25 @@ def _all(pencil: Pencil, known: NDArray) -> tuple[NDArray, NDArray]:
         across = pencil.stiffness[light][:, heavy].toarray()
         follow = -np.linalg.solve(pencil.stiffness[light][:, light].toarray(), across)
         stiffness = stiffness + across.T @ follow
-    if known.shape[1]:
-        carried = mass @ known[heavy]
-        far = 4.0 * np.abs(stiffness).sum(axis=1).max() / mass.diagonal().min()
-        stiffness = stiffness + far * (carried @ carried.T)
-    _, vectors = eigh(stiffness, mass)
-    vectors = vectors[:, : len(heavy) - known.shape[1]]
+    carried, shift = mass @ known[heavy], _shift(pencil)[0]
+    stiffness = stiffness - shift * mass + carried @ (pencil.scale * carried.T)
+    inverse, vectors = eigh(mass - carried @ carried.T, stiffness)
+    modes = len(heavy) - known.shape[1]
+    if not _is_definite(mass):
+        modes = int((inverse > WEIGHTLESS * inverse[-1]).sum())
+    vectors = vectors[:, ::-1][:, :modes]
     shapes = np.zeros((pencil.size, vectors.shape[1]))
     shapes[heavy], shapes[light] = vectors, follow @ vectors
+    shapes /= np.sqrt(np.einsum("ik,ik->k", shapes, pencil.mass @ shapes))
     return pencil.quotients(shapes), shapes  # more accurate than the eigenvalues of a full matrix
+
+
+def _is_definite(mass: NDArray) -> bool:
+    try:
+        np.linalg.cholesky(mass)
+    except np.linalg.LinAlgError:
+        return False
+    return True
 
 
 def _sparse(pencil: Pencil, count: int, known: NDArray, verify: bool) -> Spectrum:

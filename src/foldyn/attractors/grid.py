@@ -298,7 +298,7 @@ def _size(
     widest = float(np.ptp(every, axis=(0, 1)).max())
     if not driven or size < same * widest:
         size = widest
-    return max(size, LEAST * float(case.structure.bar_length.max()))
+    return max(size, LEAST * case.body.sheet.longest())
 
 
 def told_apart(

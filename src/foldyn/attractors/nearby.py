@@ -210,7 +210,7 @@ class Pair:
             engine = motion.method.engine(motion.case, motion.packed, motion.state, motion.plan)
             engines.append(engine)
             self._advance(motion, engine, 0)  # records the start
-        size = max(self._size(first), SMALL * float(first.case.structure.bar_length.max()))
+        size = max(self._size(first), SMALL * first.case.body.sheet.longest())
         difference = [self._aside, *(0.0 * array for array in _arrays(first)[1:])]
         away = self._distance(*difference[:2])
         steps = first.plan.every

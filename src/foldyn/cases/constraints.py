@@ -266,7 +266,7 @@ def check_tied(case: Any, displacement: NDArray, field: str) -> None:
     if not ties:
         return
     gap = np.where(ties.along, 0.0, np.abs(ties.values(displacement)))
-    if gap.max() > AGREES * case.structure.bar_length.max():
+    if gap.max() > AGREES * case.body.sheet.longest():
         worst = int(gap.argmax())
         raise InputError(
             f": does not satisfy {ties.owners[worst]}: node {ties.equations[worst].dofs[0] // 3} "

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import platform
+import re
 from collections.abc import Callable
 from functools import partial
 from importlib import metadata
@@ -11,11 +12,6 @@ from importlib import metadata
 from foldyn import __version__
 from foldyn.errors import InputError, optional
 from foldyn.studies import shipped_cases
-
-REQUIRED = (
-    "numpy", "scipy", "numba", "xarray", "h5netcdf", "matplotlib", "tqdm", "shapely", "svgelements",
-    "defusedxml",
-)  # fmt: skip
 
 
 def info() -> str:
@@ -42,10 +38,11 @@ def info() -> str:
     drawings = _part(lambda: f"ezdxf {ezdxf().__version__}", "ezdxf")
     processors = os.cpu_count() or 1
     ready = sum(map(compiled, METHODS))
+    needed = (one for one in metadata.requires("foldyn") or () if "extra ==" not in one)
     lines = [
         f"foldyn {__version__}",
         f"python {platform.python_version()}, {platform.system()} {platform.machine()}",
-        *(f"{name} {_version(name)}" for name in REQUIRED),
+        *sorted(map(_version, needed)),
         f"processors: {processors}; the motion of a large sheet runs on up to "
         f"{min(MOST, processors)}",
         *(
@@ -92,8 +89,9 @@ def _installed(name: str) -> str:
     return metadata.version(name)
 
 
-def _version(name: str) -> str:
+def _version(requirement: str) -> str:
+    name = re.split(r"[^\w.-]", requirement)[0]
     try:
-        return metadata.version(name)
+        return f"{name} {metadata.version(name)}"
     except metadata.PackageNotFoundError:
-        return f"missing: pip install {name}"
+        return f"{name} missing: pip install {name}"

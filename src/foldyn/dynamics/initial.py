@@ -262,7 +262,7 @@ def check_imposed(case: Case, u: NDArray, carried: NDArray) -> None:
     apart = np.where(case.imposed, np.abs(q), 0.0)
     slaves = case.imposed_slaves
     apart.ravel()[slaves] = np.abs(case.constraints.coordinates(q.ravel()))[slaves]
-    if apart.max() > AGREES * case.structure.bar_length.max():
+    if apart.max() > AGREES * case.body.sheet.longest():
         node, axis = (int(k) for k in np.unravel_index(apart.argmax(), apart.shape))
         raise InputError(
             f"supports: node {node} is imposed {carried[node, axis]:.6g} m along "

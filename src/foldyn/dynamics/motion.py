@@ -35,13 +35,12 @@ from foldyn.errors import (
     FoldynError,
     InstabilityError,
     MotionInterrupted,
-    StretchWarning,
     warn,
 )
 from foldyn.mechanics.inelastic import HingeMemory
 from foldyn.results import trajectory_dataset
 from foldyn.results.crossings import Crossings, crossings_of
-from foldyn.structures.stretching import remedy, stretch
+from foldyn.structures.stretching import warn_of_stretching
 
 if TYPE_CHECKING:
     import xarray
@@ -68,7 +67,7 @@ class Motion:
         packed: PackedCase, sampler: Sampler, reason: str = "",
         better: Callable[[], Motion] | None = None, device: str = "cpu",
     ) -> None:  # fmt: skip
-        self.device = device
+        self.device, self.kind = device, method.name
         self.case, self.method, self.plan = case, method, plan
         self.critical, self.force, self.reason = critical, force, reason
         self._initial, self.origin, self.packed, self._sampler = state, origin, packed, sampler
@@ -161,24 +160,16 @@ class Motion:
             text = crossings.text(when, self.stored)
             warn(text, "results.md#panels-that-cross", CrossingWarning)
         result = self._dataset(crossings)
-        if text := self._stretch(result):
-            warn(text, "models.md#where-panels-stretch", StretchWarning)
-        if self.case.lines is not None:
-            tension, times = result["tension"].values, result["time"].values
-            self.case.pressed(tension, lambda at: f"t = {times[at]:.6g} s")
-        return result
-
-    def _stretch(self, result: xarray.Dataset) -> str:
-        """Warning if stretching panels hold much of the strain energy; empty if not."""
         energies = {name: result[name].values for name in self.output.names}
-        found = stretch(self.case.structure, energies, result["displacement"])
-        if found is None:
-            return ""
-        at = float(result["time"][found.at])
-        return (
-            f"panels that stretch hold {found.share:.0%} of the strain energy where that is "
-            f"largest, at t = {at:.6g} s, {remedy(self.case.structure)}"
-        )
+        times, moved = result["time"].values, result["displacement"]
+
+        def place(at: int) -> str:
+            return f"t = {times[at]:.6g} s"
+
+        warn_of_stretching(self.case.structure, energies, moved, place)
+        if self.case.lines is not None:
+            self.case.pressed(result["tension"].values, place)
+        return result
 
     @cached_property
     def _other(self) -> Motion | None:

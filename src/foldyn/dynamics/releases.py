@@ -157,11 +157,6 @@ class ReleasedMotion(InMemory):
         )  # fmt: skip
 
     @property
-    def method(self) -> Any:
-        """The first method, under another name: kernels of GPUs for many motions lack releases."""
-        return replace(self.first.method, name=self.kind)
-
-    @property
     def expected_samples(self) -> int:
         """Number of samples, about, if samples are counted in steps."""
         spacing = self.interval or self.every * self.first.plan.dt

@@ -81,7 +81,8 @@ class Products:
         if self._case.structure.linear:
             return self._difference(self._pullback, weight, motion, 1.0, by, total)
         small = SMALL * self._sheet.longest() / np.abs(motion).max()
-        step = TURN * small / self._case.body.turn(self.q, self.q + small * motion)
+        turn = self._case.body.turn(self.q, self.q + small * motion)
+        step = TURN * small / max(turn, SMALL)  # nothing turns in translations
         near = NEAR * _way_to_kinks(self._sheet, self.q, small * motion) * small
         parts = [(self._pullback, step, by)]
         if near < step:

@@ -331,12 +331,13 @@ def _kinked(
 ) -> bool:
     """Whether slopes jump; then the even part of a change is linear in the step, not quadratic.
 
-    The arguments after `here` are changes of the numbers, one and two steps ahead and behind.
+    Rounding, of numbers that are 0 by symmetry, does not grow with the step. The arguments after
+    `here` are changes of the numbers, one and two steps ahead and behind.
     """
     bent, far = np.abs(ahead + behind), np.abs(far_ahead + far_behind)
     rise = np.abs(ahead - behind).max(initial=0.0)
     least = max(1e-3 * rise, 1e-8 * np.abs(here).max(initial=0.0))
-    return bool(((bent > least) & (far < 3.0 * bent)).any())
+    return bool(((bent > least) & (far > 1.5 * bent) & (far < 3.0 * bent)).any())
 
 
 def _seen(rate: NDArray, here: NDArray) -> NDArray:

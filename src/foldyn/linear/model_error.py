@@ -50,6 +50,7 @@ SHARES = (2.0, 2.0, 2.0, 3.0, 1.0)  # error of each level / difference to the ot
 SMALLEST = 1e-3  # error of every frequency, relative to it, that no comparison shows
 DOUBTFUL = 0.05  # relative error of a frequency up to which results are said to hold
 ROUNDING = 1e-4  # errors below this, relative to the highest frequency, are no reason for doubt
+WEIGHTLESS = 1e-9  # mass of a motion that a coarse mesh leaves without any, relative to its mass
 TURN = 2.0 * np.pi
 
 
@@ -213,7 +214,9 @@ def frequency_errors(
     """
     structure: Any = case.structure
     stiffness, mass = (0.5 * (each + each.conj().T) for each in changes)
-    coarse = eigh(np.diag(values) + stiffness, np.eye(len(values)) + mass, eigvals_only=True)
+    size, ways = eigh(np.eye(len(values)) + mass)
+    ways /= np.sqrt(size.clip(min=WEIGHTLESS))
+    coarse = eigh(ways.conj().T @ (np.diag(values) + stiffness) @ ways, eigvals_only=True)
     own, level, mesh = (np.sqrt(each.clip(min=0.0)) / TURN for each in (values, other, coarse))
     share = SHARES[structure.options.level - 1]
     return share * np.abs(level - own) + np.abs(mesh - own) + SMALLEST * own

@@ -23,7 +23,7 @@ from foldyn.algebra.superlu import factorize
 from foldyn.cases import Case, State
 from foldyn.condensation import Superelements
 from foldyn.dynamics.modal_damping import mass_of
-from foldyn.errors import StretchWarning, quietly, warn
+from foldyn.errors import InputError, StretchWarning, quietly, warn
 from foldyn.linear import model_error
 from foldyn.linear.hereditary import Branches, damped_mode
 from foldyn.linear.linearized import Linearized, linearize, numbered, warn_beyond
@@ -157,6 +157,12 @@ def spectrum_of(
     began = time.perf_counter()
     linear = linearize(case, state, secant=secant, load_factor=load_factor)
     pencil, space, spectrum = _lowest(linear, count, solver, verify)
+    if len(spectrum.values) < count:
+        raise InputError(
+            f" = {count}: the case has only {len(spectrum.values)} modes, as its other motions "
+            "carry no mass: ask for fewer, or take a lower level or more divisions",
+            "count",
+        )
     along = unit_translations(linear)
     _warn(spectrum)
     if compared.case is None:
@@ -190,7 +196,8 @@ def spectrum_of(
         leveled = linearize(case.altered(structure=model_error.other_level(case.structure)))
         most = min(count, Pencil(leveled.stiffness, leveled.mass).finite)
         other = np.full(len(spectrum.values), np.nan)  # a lower level may have fewer modes
-        other[:most] = _lowest(leveled, most, solver, verify=False)[-1].values[: len(other)]
+        values = _lowest(leveled, most, solver, verify=False)[-1].values[:count]
+        other[: len(values)] = values
         motion = linear.whole(spectrum.shapes)
         changes = (motion.T @ (part @ motion) for part in case.structure.changes(case.held_edges))
         estimate = model_error.frequency_errors(case, spectrum.values, other, changes)

@@ -252,7 +252,7 @@ class SheetTerm(Term):
 
     @abstractmethod
     def longest(self) -> float:
-        """Length (m) of the longest bar or side, or the extent of the nodes if there is none."""
+        """Length (m) of the longest bar or side, or else the extent of the nodes; 1 of one node."""
 
     def soft_hinges(self, q: NDArray) -> SoftHinges:
         """Hinges of the superlinear law; InputError if the model needs their slopes."""

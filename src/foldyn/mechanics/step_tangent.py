@@ -208,7 +208,7 @@ def narrowest(order: NDArray, position: NDArray, row: NDArray, column: NDArray) 
     position : (n, 3).
     row, column : places that are coupled.
     """
-    size = np.ptp(position, axis=0).max()
+    size = np.ptp(position, axis=0).max() or 1.0
     x, y, z = np.round(position / size, 6).T  # makes rows of nodes straight
     sweeps = [np.lexsort(keys) for keys in ((z, y, x), (z, x, y), (y, x, z))]
 

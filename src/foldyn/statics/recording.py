@@ -23,7 +23,6 @@ from foldyn.errors import (
     CrossingWarning,
     ModelRangeWarning,
     MotionInterrupted,
-    StretchWarning,
     warn,
 )
 from foldyn.mechanics.following import ASYMMETRIC, NO_POTENTIAL, asymmetry
@@ -35,7 +34,7 @@ from foldyn.statics.path_methods import METHODS
 from foldyn.statics.stepping import REMEDY_COLLISION, REMEDY_LOCKED, PathStoppedError, Point, Walk
 from foldyn.structures.beyond_range import TURN, far_turn, kept_apart, locks, panel_turns
 from foldyn.structures.mesh import hinge_angles, lengths
-from foldyn.structures.stretching import remedy, stretch
+from foldyn.structures.stretching import warn_of_stretching
 
 MOST_STRETCH = 2.0  # stretch of a bar: no sheet can be followed beyond it
 CLOSED = 179.0  # degrees from flat beyond which a fold counts as closed
@@ -240,13 +239,16 @@ def _dataset(
         begun = float(energies[0].sum()) - problem.energy_at_rest
         begun += problem.memories.lost(points[0].memory)
     displacement = np.array([problem.displacement(p.u) for p in points])
+
+    def named(at: int) -> str:
+        return f"point {at} (load factor {points[at].factor:.6g})"
+
     crossings = crossings_of(problem.case, displacement)
     if len(crossings.first):
-        at = int(crossings.first[0])
-        when = f"point {at} (load factor {points[at].factor:.6g})"
-        warn(crossings.text(when, len(points)), "results.md#panels-that-cross", CrossingWarning)
-    if message := _stretch_warning(problem, points, energies, displacement):
-        warn(message, "models.md#where-panels-stretch", StretchWarning)
+        text = crossings.text(named(int(crossings.first[0])), len(points))
+        warn(text, "results.md#panels-that-cross", CrossingWarning)
+    by_group = dict(zip(problem.groups, np.transpose(energies), strict=True))
+    warn_of_stretching(problem.structure, by_group, displacement, named)
     if message := _turn_warning(problem, points, displacement):
         warn(message, "superelements.md#what-it-takes", ModelRangeWarning)
     if "tension" in touches[0]:
@@ -261,10 +263,7 @@ def _dataset(
         [p.factor for p in points],
         displacement,
         np.reshape(reactions, (len(points), -1)),
-        {
-            **dict(zip(problem.groups, np.transpose(energies), strict=True)),
-            "work": _work(problem, points, residuals) + begun,
-        },
+        {**by_group, "work": _work(problem, points, residuals) + begun},
         {
             "negative_eigenvalues": [p.negative for p in points],
             "point": [p.kind for p in points],
@@ -287,22 +286,6 @@ def _dataset(
         (own,) if adaptive else (),
     )
     return crossings.recorded(result)
-
-
-def _stretch_warning(
-    problem: OrigamiProblem, points: Sequence[Point], energies: Sequence[NDArray],
-    displacement: NDArray,
-) -> str:  # fmt: skip
-    """Warning if stretched panels hold much of the strain energy; empty otherwise."""
-    by_group = dict(zip(problem.groups, np.transpose(energies), strict=True))
-    found = stretch(problem.structure, by_group, displacement)
-    if found is None:
-        return ""
-    return (
-        f"panels that stretch hold {found.share:.0%} of the strain energy where that is largest, "
-        f"at point {found.at} (load factor {points[found.at].factor:.6g}), "
-        f"{remedy(problem.structure)}"
-    )
 
 
 def _turn_warning(problem: OrigamiProblem, points: Sequence[Point], displacement: NDArray) -> str:

@@ -156,7 +156,7 @@ class BarsHingesTerm(SheetTerm):
         """Length (m) of the longest bar or side; see `SheetTerm`."""
         per_length2 = self.model.bar_per_length2
         if not per_length2.size:
-            return float(np.ptp(self.model.rest, axis=0).max())
+            return float(np.ptp(self.model.rest, axis=0).max()) or 1.0
         return float(1.0 / np.sqrt(per_length2.min()))
 
     @cached_property

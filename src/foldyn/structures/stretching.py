@@ -10,12 +10,13 @@ open sheets. Closed sheets and sheets with welds are off by 5 to 20 %, in either
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from foldyn.errors import StretchWarning, warn
 from foldyn.structures.beyond_range import LINEAR
 from foldyn.structures.discretized import Discretized
 
@@ -92,6 +93,22 @@ def stretch(structure: Any, energies: Mapping[str, NDArray], displacement: Any) 
         strain = 0.5 * (np.swapaxes(now, -1, -2) @ now - np.swapaxes(rest, -1, -2) @ rest)
         held = 0.5 * _of_strains(structure, strain)
     return Stretch(at, float(min(held / total[at], 1.0))) if held > limit * total[at] else None
+
+
+def warn_of_stretching(
+    structure: Any, energies: Mapping[str, NDArray], displacement: Any, place: Callable[[int], str]
+) -> None:  # fmt: skip
+    """Warn if stretching panels hold much of the strain energy of states, as given to `stretch`.
+
+    place : tells where the state with an index is, such as its time.
+    """
+    if found := stretch(structure, energies, displacement):
+        warn(
+            f"panels that stretch hold {found.share:.0%} of the strain energy where that is "
+            f"largest, at {place(found.at)}, {remedy(structure)}",
+            "models.md#where-panels-stretch",
+            StretchWarning,
+        )
 
 
 def stretching(structure: Discretized, displacement: NDArray, motions: NDArray) -> NDArray:

@@ -299,7 +299,7 @@ class SideBySide(Here[Point, Evaluation]):
     def __init__(self, job: Job, like: Motion) -> None:
         super().__init__(job)
         self.job = job
-        size = 48.0 * like.expected_samples * like.packed.system.rows  # bytes
+        size = 16.0 * like.expected_samples * like.case.body.size  # bytes
         self.count = int(max(1, min(AT_ONCE, ROOM / size)))
 
     def each(

@@ -26,7 +26,7 @@ def choose(
     """
     if count < FEWEST:
         return "cpu", f"a GPU pays from {FEWEST} models on"
-    method = motions[0].method.name
+    method = motions[0].kind
     if method not in METHODS:
         return "cpu", f"{method} has no GPU kernel"
     dofs = 3 * max(motion.packed.system.rows for motion in motions)

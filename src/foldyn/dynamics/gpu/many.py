@@ -51,7 +51,7 @@ def integrate_prepared(motions: Sequence[Motion]) -> set[int]:
 
 def _is_taken(motion: Motion) -> bool:
     """Whether a motion has GPU kernels, and room for its samples."""
-    if motion.method.name not in METHODS or lacking(motion.case, motion.packed):
+    if motion.kind not in METHODS or lacking(motion.case, motion.packed):
         return False
     with suppress(InputError):  # the CPU run will report the reason
         motion.restart()
