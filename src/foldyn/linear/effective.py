@@ -317,7 +317,7 @@ def _errors(linear: LinearizedCell, kind: Equivalent, own: NDArray, true: NDArra
     root[root < NONE * scale] = np.inf
     counts = np.abs(true) > LEAST * np.outer(root, root)
     error = np.divide(own, true, out=np.full_like(own, np.nan), where=counts) - 1.0
-    worst = np.unravel_index(np.nanargmax(np.abs(error)), error.shape)
+    worst = np.unravel_index(np.abs(np.nan_to_num(error)).argmax(), error.shape)
     if abs(error[worst]) > DOUBTFUL:
         warn(
             f"entry ({', '.join(kind.names[k] for k in worst)}) of the stiffness is "
