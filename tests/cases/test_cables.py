@@ -13,6 +13,8 @@ from scipy.optimize import brentq
 import foldyn as fd
 from foldyn.dynamics import METHODS
 from foldyn.errors import FoldynWarning, InputError, ModelRangeWarning
+from foldyn.sweeps.measure import asked
+from foldyn.sweeps.measures import MEASURES
 
 G = 9.81
 UP = (0.0, 0.0, 1.0)
@@ -332,6 +334,8 @@ def test_bars_that_would_buckle_are_told():
         else:
             path = fd.trace(case)
         assert float(path.tension[-1, 0]) == pytest.approx(-load, rel=1e-6)
+        share = asked("bar_load", MEASURES).number(path, case, {})
+        assert share == pytest.approx(load / limit, rel=1e-6)
 
 
 # ------------------------------------------------------------------ the mass of bars

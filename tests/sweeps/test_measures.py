@@ -51,6 +51,10 @@ EVERY = [(one, kind) for one in MEASURES.values() for kind in one.kinds if kind 
 def test_every_measure_can_be_taken_of_all_its_kinds(results, one, kind):
     given = GIVEN if kind != "statics" else {**GIVEN, "node": "0", "axis": "x", "displacement": "0"}
     words = [given[what] for what in one.takes]
+    if one.name == "bar_load":
+        with pytest.raises(InputError, match="needs a Bar with bending"):
+            take(results, kind, one.name)
+        return
     value = take(results, kind, f"{one.name}[{','.join(words)}]" if words else one.name)
     assert value.ndim == len(one.dims)
     assert one.doc

@@ -312,10 +312,14 @@ class Case(Loaded, Damped):
                 found += [(place, part, *points) for points in made.points]
         return found
 
+    def bar_loads(self, tension: NDArray) -> NDArray[np.float64]:
+        """Shares (k, c) of their buckling loads with which lines are pressed, given tensions, N."""
+        assert self.lines is not None  # or there would be no tension
+        return -np.asarray(tension) / self.lines.limits
+
     def pressed(self, tension: NDArray, named: Callable[[int], str]) -> None:
         """Warn of bars beyond their buckling load, given tensions (k, c) in k states."""
-        assert self.lines is not None  # or there would be no tension
-        share = -np.asarray(tension) / self.lines.limits
+        share = self.bar_loads(tension)
         if share.size and share.max() > 1.0:
             at, line = np.unravel_index(share.argmax(), share.shape)
             warn(

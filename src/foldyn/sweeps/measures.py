@@ -269,6 +269,13 @@ def _strain(result: xr.Dataset, case: Case) -> float:
     return float(np.abs(bar_strain(case.structure, moved)).max())
 
 
+@_measure(*MOVED, doc="largest share of its buckling load with which a bar is pressed", whole=True)
+def _bar_load(result: xr.Dataset, case: Case) -> float:
+    if case.lines is None or np.isinf(case.lines.limits).all():
+        raise InputError("needs a Bar with bending, of which the buckling load follows")
+    return float(max(0.0, case.bar_loads(sampled(result, "tension").values).max()))
+
+
 def _stressed(result: xr.Dataset, case: Case) -> xr.Dataset:
     return stresses_of(case, result)
 
