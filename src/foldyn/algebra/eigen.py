@@ -44,6 +44,7 @@ EPS = float(np.finfo(float).eps)
 ROUNDING = 5.0 * EPS  # rounding error of an eigenvalue at zero, relative to |phi|' |K| |phi|
 NUDGES = 4  # largest number of small moves of a shift that hits an eigenvalue
 NUDGE = 1e-7
+LIGHT = 1e-6  # share of the mass of its dofs that a motion of usual matrices carries at least
 WEIGHTLESS = 1e-12  # 1 / lambda of motions that carry no mass, relative to the largest one
 
 
@@ -167,8 +168,8 @@ def lowest(pencil: Pencil, count: int, known: NDArray, verify: bool = True) -> S
 def _all(pencil: Pencil, known: NDArray) -> tuple[NDArray, NDArray]:
     """All modes except the known ones.
 
-    Where some motions hardly carry any mass, as those of superelements, the largest 1 / lambda are
-    accurate, and the smallest lambda would not be.
+    Known ones are shifted above all others. Where some motions hardly carry any mass, as those of
+    superelements, the largest 1 / lambda are accurate, and the smallest lambda would not be.
     """
     heavy, light = np.flatnonzero(pencil.heavy), np.flatnonzero(~pencil.heavy)
     mass = pencil.mass.toarray()[np.ix_(heavy, heavy)]
@@ -178,25 +179,23 @@ def _all(pencil: Pencil, known: NDArray) -> tuple[NDArray, NDArray]:
         across = pencil.stiffness[light][:, heavy].toarray()
         follow = -np.linalg.solve(pencil.stiffness[light][:, light].toarray(), across)
         stiffness = stiffness + across.T @ follow
-    carried, shift = mass @ known[heavy], _shift(pencil)[0]
-    stiffness = stiffness - shift * mass + carried @ (pencil.scale * carried.T)
-    inverse, vectors = eigh(mass - carried @ carried.T, stiffness)
-    modes = len(heavy) - known.shape[1]
-    if not _is_definite(mass):
-        modes = int((inverse > WEIGHTLESS * inverse[-1]).sum())
-    vectors = vectors[:, ::-1][:, :modes]
+    carried, modes = mass @ known[heavy], len(heavy) - known.shape[1]
+    size = np.sqrt(mass.diagonal())
+    lightest = float(np.linalg.eigvalsh(mass / np.outer(size, size))[0])
+    if lightest > LIGHT:
+        far = 4.0 * np.abs(stiffness).sum(axis=1).max() / mass.diagonal().min()
+        _, vectors = eigh(stiffness + far * (carried @ carried.T), mass)
+    else:
+        stiffness = stiffness - _shift(pencil)[0] * mass + carried @ (pencil.scale * carried.T)
+        inverse, vectors = eigh(mass - carried @ carried.T, stiffness)
+        if lightest < ROUNDING * len(heavy):
+            modes = int((inverse > WEIGHTLESS * inverse[-1]).sum())
+        vectors = vectors[:, ::-1]
+    vectors = vectors[:, :modes]
     shapes = np.zeros((pencil.size, vectors.shape[1]))
     shapes[heavy], shapes[light] = vectors, follow @ vectors
     shapes /= np.sqrt(np.einsum("ik,ik->k", shapes, pencil.mass @ shapes))
     return pencil.quotients(shapes), shapes  # more accurate than the eigenvalues of a full matrix
-
-
-def _is_definite(mass: NDArray) -> bool:
-    try:
-        np.linalg.cholesky(mass)
-    except np.linalg.LinAlgError:
-        return False
-    return True
 
 
 def _sparse(pencil: Pencil, count: int, known: NDArray, verify: bool) -> Spectrum:

@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 import xarray
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from foldyn.cases import Case, State
 from foldyn.cases.reached import Reached
@@ -239,6 +238,8 @@ class ReleasedMotion(InMemory):
 
         The motion may start otherwise than it went on: if it is late, the second sample counts.
         """
+        from scipy.optimize import brentq  # loads slowly
+
         gone = _gone(times, span[0])
 
         def beyond(time: float) -> float:

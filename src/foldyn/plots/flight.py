@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 import xarray as xr
-from matplotlib.figure import Figure
 
-from foldyn.plots.chart_figures import figure_of
 from foldyn.plots.charts import Chart, Curve
 from foldyn.results.free_flight import attitude
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 def plot_attitude(trajectory: xr.Dataset, panel: int | None = None, *, title: str = "") -> Figure:
@@ -42,6 +45,8 @@ def plot_attitude(trajectory: xr.Dataset, panel: int | None = None, *, title: st
     >>> len(fd.plots.plot_attitude(flight).axes)
     2
     """
+    from foldyn.plots.chart_figures import figure_of  # loads Matplotlib
+
     return figure_of(attitude_charts(trajectory, panel), (9.0, 3.2), title, 2)
 
 
