@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 import foldyn as fd
+from foldyn.cli.main import main
 from foldyn.errors import ComputationError, InputError
 from foldyn.structures.mesh import hinge_angles
+from foldyn.sweeps.run_sweep import names_of
 
 PANEL = fd.Pattern([(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0)], [(0, 1, 2, 3)])
 PLATE = fd.discretize(PANEL, fd.Sheet(1e7, 0.3, 0.01, 100.0), preset="plate")
@@ -312,3 +314,39 @@ def test_gradients_refuse_releases():
             made, {"thickness": 0.01}, measures=["displacement[2,z]"],
             analysis={"kind": "statics", "load_factors": [0.0, 0.5, 1.0]},
         )  # fmt: skip
+
+
+PRESSED = """
+    [pattern]
+    kind = "simple_fold"
+    dihedral = 60
+    [sheet]
+    youngs_modulus = 1e6
+    poissons_ratio = 0.25
+    thickness = 0.01
+    density = 1.0
+    [[supports]]
+    nodes = [4, 5]
+    [[supports]]
+    nodes = [0, 1]
+    axes = "z"
+    [[loads]]
+    nodes = [2, 3]
+    force = [0, 0, 0.05]
+    [contact]
+    panels = false
+    planes = [{ point = [0, 0, -5], normal = [0, 0, 1] }]
+    [analysis]
+    kind = "statics"
+    steps = 2
+"""
+
+
+def test_pages_of_paths_with_planes_and_names_of_swept_nodes(tmp_path):
+    """Energies of contact have no prefix; keys do not take the names of a result's dimensions."""
+    file = tmp_path / "pressed.toml"
+    file.write_text(PRESSED)
+    assert main(["run", str(file), "--out", str(tmp_path / "out"), "--quiet"]) == 0
+    assert "contact" in (tmp_path / "out/report.html").read_text("utf-8")
+    assert names_of(["supports[2].until.node"], ()) == ["supports_2_until_node"]
+    assert names_of(["supports[2].until.angle"], ()) == ["angle"]
