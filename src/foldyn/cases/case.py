@@ -312,6 +312,11 @@ class Case(Loaded, Damped):
                 found += [(place, part, *points) for points in made.points]
         return found
 
+    @cached_property
+    def line_places(self) -> tuple[str, ...]:
+        """Places of the springs between nodes, bars and cables, one for each line."""
+        return tuple(place for place, *_ in self.polylines())
+
     def bar_loads(self, tension: NDArray) -> NDArray[np.float64]:
         """Shares (k, c) of their buckling loads with which lines are pressed, given tensions, N."""
         assert self.lines is not None  # or there would be no tension

@@ -48,6 +48,10 @@ class Reached(Part):
         """The quantity at displacements (n, 3), m; gone : places of what is released."""
         raise NotImplementedError
 
+    def at_rest(self, case: Any) -> float:
+        """The quantity at rest."""
+        return self.measured(case, np.zeros_like(case.structure.nodes), lambda history: 0.0, ())
+
     def share(self, case: Any) -> Callable[..., float]:
         """Share of the way from rest: 1 where the value is reached.
 
@@ -55,8 +59,7 @@ class Reached(Part):
         what is released.
         """
         self.check(case)
-        rest = self.measured(case, np.zeros_like(case.structure.nodes), lambda history: 0.0, ())
-        goal = getattr(self, self.goal)
+        rest, goal = self.at_rest(case), getattr(self, self.goal)
         if math.isclose(goal, rest):
             raise InputError(f" = {goal:g}: is the value at rest; give another", self.goal)
 
@@ -160,9 +163,9 @@ class ReachedTension(Reached):
         self, case: Any, displacement: NDArray, factors: Factors, gone: Collection[str]
     ) -> float:
         """See `Reached`."""
-        place = case.polylines()[self.line][0] if gone else ""
-        pulls = case.elastic_body.term(SpringsTerm).at(factors).pulls(displacement)
-        return 0.0 if place in gone else float(pulls[self.line])
+        if gone and case.line_places[self.line] in gone:
+            return 0.0
+        return float(case.elastic_body.term(SpringsTerm).at(factors).pulls(displacement)[self.line])
 
 
 REACHED = PartOf(

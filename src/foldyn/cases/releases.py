@@ -9,8 +9,6 @@ from collections.abc import Collection, Sequence
 from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
 from foldyn.cases.directions import AXES
 from foldyn.cases.latches import Latch
 from foldyn.cases.reached import Reached, ReachedTension
@@ -96,8 +94,8 @@ def check_releases(case: Any) -> bool:
 
 def _check_fuse(case: Any, until: ReachedTension, places: Collection[str]) -> None:
     """Refuse a line that waits for less than its own tension at rest."""
-    rest = until.measured(case, np.zeros_like(case.structure.nodes), lambda history: 0.0, ())
-    if case.polylines()[until.line][0] in places and abs(until.tension) < abs(rest):
+    rest = until.at_rest(case)
+    if case.line_places[until.line] in places and abs(until.tension) < abs(rest):
         raise InputError(
             f" = {until.tension:g}: at rest it has {rest:.6g} N already; give more", "tension"
         )

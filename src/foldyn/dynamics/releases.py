@@ -136,7 +136,7 @@ class ReleasedMotion(InMemory):
     ) -> Motion:  # fmt: skip
         """Part of the motion, from a state; if watched, it ends where something is reached."""
         length, dt = stop - now, self.longest
-        if self.interval and abs(count := round(length / self.interval)):
+        if self.interval and (count := round(length / self.interval)):
             exact = count * self.interval
             length = exact if abs(exact - length) <= self._near * self.interval else length
         if dt is not None and abs(length - round(length / dt) * dt) > SAME * length:
@@ -288,8 +288,7 @@ class ReleasedMotion(InMemory):
         energy = np.stack([whole[name] for name in names], axis=1)
         scale, off = energy_scale(energy, case.air is not None), energy_error(energy)
         facts |= {"interval": self.interval} if self.interval else {"every_steps": self.every}
-        gone = {place: times[place] for place in sorted(times, key=times.__getitem__)}
-        gone = {place: time for place, time in gone.items() if time <= self.end}
+        gone = {p: times[p] for p in sorted(times, key=times.__getitem__) if times[p] <= self.end}
         facts |= {
             "duration": self.end - self.start,
             "dt": (self.end - self.start) / max(1, facts["steps"]),

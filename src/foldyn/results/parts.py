@@ -49,7 +49,7 @@ def placed(
         at = own["time" if along == "time" else "load_factor"].values.tolist()
         moved = zip(at, own["displacement"].values, strict=True)
         pulls = np.array([case.lines.at(factors(x)).pulls(u) for x, u in moved])
-        pulls = pulls * [place not in gone for place, *_ in case.polylines()]
+        pulls = pulls * [place not in gone for place in case.line_places]
         own = own.drop_vars("tension", errors="ignore")
         own["tension"] = variable((along, "line"), pulls, TENSION.units, TENSION.text)
     return own.drop_vars(["support", "plane"], errors="ignore")

@@ -158,6 +158,8 @@ def record(
             points.append(station.point)
             if progress is not None:
                 progress(station.point)
+            if until is None and watch is None:
+                continue
             at = problem.displacement(station.point.u).copy(), station.point.factor
             if until is not None and len(points) > 1 and until(*at):
                 until = None

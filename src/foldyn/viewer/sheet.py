@@ -100,7 +100,7 @@ def gone(case: Case, result: xr.Dataset) -> dict[str, Any]:
         still = dict(held(released(case, [place for place in first if first[place] <= sample])))
         for node, _ in held(case):
             nodes |= {} if node in still or node in nodes else {node: sample}
-    return {"gone": {"held": nodes, "lines": [first.get(place) for place, *_ in case.polylines()]}}
+    return {"gone": {"held": nodes, "lines": [first.get(place) for place in case.line_places]}}
 
 
 def lines(case: Case) -> list[list[Any]]:
